@@ -40,7 +40,7 @@ pub struct Advise {
     #[arg(long, num_args = 1.., value_name = "DIR", conflicts_with_all = ["scene", "rays", "class", "table"])]
     fit: Vec<PathBuf>,
     /// File for the fitted table [default: it is tried and not kept]
-    #[arg(long, value_name = "FILE", requires = "fit")]
+    #[arg(long, value_name = "FILE", requires = "fit", conflicts_with = "scene")]
     save: Option<PathBuf>,
     #[command(flatten)]
     values: ValueArguments,
@@ -232,17 +232,18 @@ fn why(advised: &[(Prediction, f64)], demand: &Demand) -> String {
         return String::new();
     };
     let rays_ms = ms - best.build_ms;
+    let share = |of_one: f64| format!("{:.1}", 100.0 * of_one);
     let mut text = format!(
         "{}: {} % of its cost are rays, {} % the build.",
         best.choice.label(),
-        number((100.0 * rays_ms / ms).round()),
-        number((100.0 * best.build_ms / ms).round()),
+        share(rays_ms / ms),
+        share(best.build_ms / ms),
     );
     if let Some((next, next_ms)) = others.first() {
         text += &format!(
             " {} would cost {} % more.",
             next.choice.label(),
-            number((100.0 * (next_ms / ms - 1.0)).round())
+            share(next_ms / ms - 1.0)
         );
     }
     let ns = |p: &Prediction, ms: f64| (ms - p.build_ms) / demand.rays * 1e6;
@@ -264,7 +265,7 @@ fn why(advised: &[(Prediction, f64)], demand: &Demand) -> String {
     let above = faster.map(|(p, ms)| ((p.build_ms - best.build_ms) / (own - ns(p, *ms)) * 1e6, p));
     if let Some((rays, p)) = above.min_by(|a, b| a.0.total_cmp(&b.0)) {
         text += &format!(
-            " From {} rays on {} is.",
+            " From {} rays on {} is cheaper.",
             count(rays as u64),
             p.choice.label()
         );

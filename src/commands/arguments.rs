@@ -1,6 +1,6 @@
 //! Arguments that several commands share.
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Args;
 use raystone::config::{Axis, Cell, Experiment, Plan, split_outside_brackets};
 use raystone::gpu::{self, AdapterChoice, Gpu, KernelLibrary};
@@ -112,10 +112,26 @@ pub fn of_flags(
     set: &[String],
     registries: &Registries,
 ) -> Result<Experiment> {
-    let overrides: Vec<String> = flags.into_iter().chain(set.iter().cloned()).collect();
+    let flags: Vec<String> = flags.into_iter().collect();
+    let overrides: Vec<String> = flags.iter().chain(set).cloned().collect();
     let name = format!("raystone {command}");
     let catalogue = registries.catalogue();
-    Ok(Experiment::parse(CELL, &name, &overrides, &catalogue)?)
+    Experiment::parse(CELL, &name, &overrides, &catalogue)
+        .map_err(|error| anyhow!(as_typed(error.to_string(), &flags)))
+}
+
+/// Returns a message about flags that are read as overrides with the flags in their place.
+fn as_typed(message: String, flags: &[String]) -> String {
+    let named = |text: String, flag: &String| {
+        let key = flag.split('=').next().unwrap_or_default();
+        let typed = match key.split_once('.') {
+            Some(("run", "resolution")) => "size",
+            Some(("axes" | "run", name)) => name,
+            _ => return text,
+        };
+        text.replace(&format!("--set {flag}"), &format!("--{typed}"))
+    };
+    flags.iter().fold(message, named)
 }
 
 /// Returns the one cell of an experiment.

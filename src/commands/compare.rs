@@ -32,6 +32,7 @@ const SMALL: (&str, &str) = (
 /// Two runs (`raystone compare BASE CANDIDATE`): folders or files of records. One run with two sets of kernels on its axis
 /// (`raystone compare RUN`). Or two sets of kernels that are measured first, in the same rounds (`raystone compare
 /// --kernels A B [FILE]`).
+// Many fields: one for each argument.
 #[derive(Args)]
 pub struct Compare {
     /// Base and candidate; one run that holds both; with --kernels an experiment (*.toml) [default: a small one]

@@ -215,7 +215,8 @@ mod tests {
             ("--spp", "0", "1..=65536"),
             ("--spp", "70000", "1..=65536"),
             ("--size", "64", "512x384"),
-            ("--size", "64x4", "run.resolution"),
+            ("--size", "64x4", "--size: "),
+            ("--integrator", "pat", "--integrator: unknown"),
         ] {
             let error = experiment(&[flag, text]).unwrap_err();
             assert!(error.contains(says), "{text}: {error}");

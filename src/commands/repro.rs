@@ -3,7 +3,7 @@
 use super::failure::{BAD_INPUT, FAILED};
 use super::output::{OutputArguments, tell};
 use super::signals;
-use anyhow::{Result, anyhow};
+use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use raystone::config::Shard;
 use raystone::gpu::{AdapterChoice, GpuError, is_software};
@@ -100,11 +100,21 @@ impl Repro {
                 reproduce(source, &settings, &registries, &options).map(Some)
             };
             match found {
+                Ok(None) if mine && self.name.iter().any(|name| name == source.name) => {
+                    let why = "the folder holds no whole records of it; those of --quick are read with --quick";
+                    failed.push((source.name.to_owned(), why.to_owned()));
+                }
                 Ok(table) => tables.extend(table),
                 Err(error) if ends_all(&error) => return Err(error.into()),
                 Err(ReproError::Run(RunError::Interrupted)) => signals::wait_for_end(),
                 Err(error) => failed.push((source.name.to_owned(), error.to_string())),
             }
+        }
+        if tables.is_empty() && failed.is_empty() && self.pages {
+            bail!(
+                "{}: holds no whole records of a table, so there is no page to write; without --pages they are run",
+                settings.out.display()
+            );
         }
         if self.shard.is_some() {
             return Ok(end(&tables, &failed));

@@ -16,6 +16,7 @@ use raystone::run::{
     Cost, Existing, Kernels, Registries, RunError, RunOptions, RunSummary, render_references,
 };
 use raystone::store::user_folder;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -30,7 +31,7 @@ pub struct Run {
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
     /// Render the references alone and keep them where runs find them; with --shard, a part of their samples
-    #[arg(long, conflicts_with_all = ["no_cache", "resume", "force", "number"])]
+    #[arg(long, conflicts_with_all = ["no_cache", "resume", "force", "number", "dry_run"])]
     references: bool,
     #[command(flatten)]
     failures: FailureArguments,
@@ -138,7 +139,7 @@ impl Run {
         options.lenient = self.failures.lenient;
         options.cache = user_folder().filter(|_| !self.no_cache);
         if self.references {
-            return references(&experiment, &plan, &registries, &options);
+            return references(&experiment, &plan, &registries, (&options, &self.output));
         }
         carry_out(
             "run",
@@ -192,15 +193,17 @@ fn references(
     experiment: &Experiment,
     plan: &Plan,
     registries: &Registries,
-    options: &RunOptions,
+    (options, shown): (&RunOptions, &OutputArguments),
 ) -> Result<ExitCode> {
     let (rendered, failures) = render_references(experiment, plan, registries, options)?;
     let folder = options.cache.as_deref().unwrap_or(Path::new("."));
-    print(&format!(
+    let text = format!(
         "{} rendered; kept in {}\n",
         plural(rendered, "part of a reference", "parts of references"),
         folder.display()
-    ))?;
+    );
+    let fields = json!({ "rendered": rendered, "failed": failures, "folder": folder });
+    shown.show("run", fields, &text)?;
     for failure in &failures {
         output::tell(&format!("failed: {failure}"));
     }

@@ -5,7 +5,8 @@ use raystone_core::params::Variant;
 use raystone_core::text::did_you_mean_or_known;
 use std::fmt;
 
-/// Selects variants of one axis by name or label, with `*` for any text; a leading `!` negates.
+/// Selects variants of one axis by name or label, with `*` for any text; a leading `!` negates. `bvh()` is the variant whose label
+/// is `bvh`, alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern(String);
 
@@ -21,7 +22,10 @@ impl Pattern {
             Some(rest) => (false, rest),
             None => (true, self.0.as_str()),
         };
-        let fits = glob_matches(glob, &variant.name) || glob_matches(glob, &variant.label);
+        let fits = match glob.strip_suffix("()") {
+            Some(label) => glob_matches(label, &variant.label),
+            None => glob_matches(glob, &variant.name) || glob_matches(glob, &variant.label),
+        };
         fits == positive
     }
 
@@ -198,6 +202,9 @@ mod tests {
             label: "uniform-grid(lambda=3)".into(),
         };
         for (text, fits) in [
+            ("uniform-grid()", false),
+            ("uniform-grid(lambda=3)()", true),
+            ("!uniform-grid()", true),
             ("uniform-grid", true),
             ("uniform-grid(lambda=3)", true),
             ("uniform-grid(lambda=8)", false),

@@ -226,8 +226,8 @@ impl Plan {
     fn write_description(&self, text: &mut String) -> fmt::Result {
         writeln!(
             text,
-            "{} structures to build, gate and time:",
-            self.structures.len()
+            "{} to build, gate and time:",
+            plural(self.structures.len(), "structure")
         )?;
         for scene in &self.scenes {
             let cells = self.structures.iter().filter(|c| c[Axis::Scene] == *scene);
@@ -238,17 +238,17 @@ impl Plan {
         }
         writeln!(
             text,
-            "{} samplers whose error is measured:",
-            self.samplers.len()
+            "{} whose error is measured:",
+            plural(self.samplers.len(), "sampler")
         )?;
         for cell in &self.samplers {
             writeln!(text, "  {cell}, replicates: {}", self.renders(cell))?;
         }
-        writeln!(text, "{} full cells to time", self.times.len())?;
+        writeln!(text, "{} to time", plural(self.times.len(), "full cell"))?;
         writeln!(
             text,
-            "{} streams whose star discrepancy is measured:",
-            self.streams.len()
+            "{} whose star discrepancy is measured:",
+            plural(self.streams.len(), "stream")
         )?;
         for cell in &self.streams {
             writeln!(text, "  {cell}")?;
@@ -296,4 +296,9 @@ fn no_structure(cell: &Cell) -> Skipped {
         reason: "no structure is left that could trace this scene with these kernels".to_owned(),
         cells: 1,
     }
+}
+
+/// A number with its noun.
+fn plural(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }

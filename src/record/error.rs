@@ -200,13 +200,17 @@ impl SpectrumRecord {
     pub fn readings(&self) -> Vec<Reading> {
         let key = Key::default().with(axis::SPP, self.spp);
         let before = self.unfiltered();
-        let whole = Reading::known([
+        let whole = self.filtered.iter().find(|at| at.sigma == 0.0);
+        let readings = Reading::known([
             (&figure::LOW_FREQUENCY_POWER, self.low_frequency),
             (&figure::LOUDEST_WAVE, self.loudest),
             (&figure::NEIGHBOUR_CORRELATION, self.autocorrelation),
-            (&figure::LUMINANCE_RMSE, before.map(Interval::exact)),
+            (
+                &figure::LUMINANCE_RMSE,
+                whole.map(|at| at.rmse).filter(|_| before.is_some()),
+            ),
         ]);
-        let mut readings: Vec<Reading> = whole
+        let mut readings: Vec<Reading> = readings
             .into_iter()
             .map(|reading| reading.at(key.clone()))
             .collect();

@@ -199,6 +199,8 @@ figures! {
     // Errors of samplers.
     RELMSE_UNBIASED = "relmse-unbiased/v1", "unbiased relMSE", "", Lower, THREE, Jackknife;
     RMSE_UNBIASED = "rmse-unbiased/v1", "unbiased RMSE", "", Lower, THREE, Jackknife;
+    RELMSE = "relmse/v1", "relMSE", "", Lower, THREE, Jackknife;
+    RMSE = "rmse/v1", "RMSE", "", Lower, THREE, Jackknife;
     RELMSE_SLOPE = "relmse-slope/v1", "slope of relMSE", "", Lower, Exponent, Jackknife;
     RMSE_SLOPE = "rmse-slope/v1", "slope of RMSE", "", Lower, Exponent, Jackknife;
     MAE = "mae/v1", "MAE", "", Lower, THREE, Mean;
@@ -220,7 +222,7 @@ figures! {
     LOW_FREQUENCY_POWER = "low-frequency-power/v1", "low-frequency power", "", Lower, THREE, Mean;
     LOUDEST_WAVE = "loudest-wave/v1", "loudest wave", "", Lower, THREE, Mean;
     NEIGHBOUR_CORRELATION = "neighbour-correlation/v1", "correlation", "", Lower, THREE, Mean;
-    LUMINANCE_RMSE = "luminance-rmse/v1", "RMSE", "", Lower, THREE, Single;
+    LUMINANCE_RMSE = "luminance-rmse/v1", "RMSE", "", Lower, THREE, Mean;
     FILTERED_SHARE = "filtered-share/v1", "share of the RMSE after a filter", "", Lower, Percent, Single;
     REFERENCE_MSE = "reference-mse/v1", "MSE of the reference", "", Lower, THREE, Single;
     // Point sets.

@@ -10,6 +10,7 @@ use raystone_stats::comparison::LogFigure;
 use raystone_stats::heavy_tails::is_heavy;
 use raystone_stats::statistics::{
     LEAST_FOR_MEDIAN, jackknife_interval, log_log_fit, mean_interval, positive_interval,
+    positive_mean_interval,
 };
 
 use std::sync::OnceLock;
@@ -60,11 +61,13 @@ impl Metric {
         }
     }
 
-    /// Returns its row in the table of figures.
-    pub fn figure(self) -> &'static Figure {
-        match self {
-            Self::RelMse => &figure::RELMSE_UNBIASED,
-            Self::Rmse => &figure::RMSE_UNBIASED,
+    /// Returns its row in the table of figures: that of the recorded metric of this id.
+    fn figure_of(self, id: &str) -> &'static Figure {
+        match (self, id.contains("-unbiased/")) {
+            (Self::RelMse, true) => &figure::RELMSE_UNBIASED,
+            (Self::RelMse, false) => &figure::RELMSE,
+            (Self::Rmse, true) => &figure::RMSE_UNBIASED,
+            (Self::Rmse, false) => &figure::RMSE,
         }
     }
 
@@ -74,11 +77,6 @@ impl Metric {
             Self::RelMse => &figure::RELMSE_SLOPE,
             Self::Rmse => &figure::RMSE_SLOPE,
         }
-    }
-
-    /// Returns its name in tables and on axes.
-    pub fn name(self) -> &'static str {
-        &self.figure().title
     }
 
     /// Returns its stem in file names.
@@ -182,6 +180,12 @@ impl<'a> MeasuredSampler<'a> {
         self.fault().filter(|_| !(by_design && finite))
     }
 
+    /// Returns a metric's row in the table of figures.
+    pub(crate) fn figure(&self, metric: Metric) -> &'static Figure {
+        let [_, unbiased, _] = metric.words();
+        metric.figure_of(self.metric_id(metric).unwrap_or(unbiased))
+    }
+
     /// Returns the full id of a metric as recorded.
     pub(crate) fn metric_id(&self, metric: Metric) -> Option<&'a str> {
         let errors = self.replicates.iter().flat_map(|r| &r.errors);
@@ -241,7 +245,18 @@ impl<'a> MeasuredSampler<'a> {
             let values = errors.filter_map(|error| error.metrics.get(id).copied());
             values.collect()
         };
-        FURTHER_METRICS.map(|(figure, id)| (figure, mean_interval(&of(id))))
+        FURTHER_METRICS.map(|(figure, id)| {
+            // These are no errors, and may be negative.
+            let is_likeness = [&figure::PSNR, &figure::SSIM]
+                .map(|f| &f.id)
+                .contains(&&figure.id);
+            let interval = if is_likeness {
+                mean_interval
+            } else {
+                positive_mean_interval
+            };
+            (figure, interval(&of(id)))
+        })
     }
 
     /// Returns the mean error at this spp.
@@ -336,6 +351,15 @@ impl View<'_> {
         let is_known = sampler.replicates.iter().all(|r| !r.image_hash.is_empty());
         let mut samplers = self.samplers.iter();
         is_known && samplers.any(|s| s.key == original && hashes(s) == hashes(sampler))
+    }
+
+    /// Returns a metric's row in the table of figures: all samplers have one reference, and so one kind of metric.
+    pub(crate) fn figure(&self, metric: Metric) -> &'static Figure {
+        let measured = self.samplers.iter();
+        let mut figures = measured.filter(|s| s.metric_id(metric).is_some());
+        figures
+            .next()
+            .map_or(metric.figure_of("-unbiased/"), |s| s.figure(metric))
     }
 
     /// Returns the reason why the errors of this view may not be ranked: the reference is absent, or too noisy for

@@ -103,7 +103,7 @@ impl Screen {
     /// and then columns continue below, beside the first one again: a figure is never cut.
     pub fn table(self, table: &Table) -> String {
         let grid = Grid::new(table);
-        let mut out = self.lines(&table.caption);
+        let mut out = self.lines(&table.caption.replace(" [95 % interval]", ""));
         match self.width {
             Some(width) if grid.natural().iter().sum::<usize>() > width => {
                 let widths = grid.fitted(width);

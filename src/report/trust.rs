@@ -19,7 +19,10 @@ pub(crate) fn doubt_of_rays(scene: &SceneGroup) -> Option<String> {
 
 /// Returns the reason why no structure may be called the fastest for rendering.
 pub(crate) fn doubt_of_rendering(scene: &SceneGroup, view: &View) -> Option<String> {
-    let unequal = view.times.iter().find(|time| !time.image_equal);
+    let unequal = view
+        .times
+        .iter()
+        .find(|time| !time.image_equal && time.failure.is_none());
     let unequal = unequal.map(|time| {
         format!(
             "the image of {} with {} differs",

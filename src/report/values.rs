@@ -294,7 +294,7 @@ fn of_sampler<'a>(data: &RunData<'a>, sampler: &MeasuredSampler<'a>) -> Vec<Valu
                 Estimate::Below(mean.error.high.max(0.0))
             };
             let key = key.clone().with(axis::SPP, mean.spp);
-            values.push(Value::new(&key, metric.figure(), reading));
+            values.push(Value::new(&key, sampler.figure(metric), reading));
         }
         let heavy = metric == Metric::RelMse && sampler.is_heavy_tailed();
         let slope = sampler

@@ -2,8 +2,8 @@
 
 use super::builder::{Look, SceneBuilder};
 use super::builtin::numeric::sin_cos_turns;
-use super::{SceneData, SceneError, Transform};
-use glam::{DVec3, Vec3};
+use super::{Light, SceneData, SceneError, Transform};
+use glam::{DVec3, Mat3, Quat, Vec3};
 use raystone_core::geometry::{Camera, Triangle};
 use raystone_core::random::Pcg32;
 use std::collections::{HashMap, HashSet};
@@ -43,9 +43,15 @@ pub(super) fn with_at_most(mut scene: SceneData, most: usize) -> Result<SceneDat
         let (name, count) = (scene.name, scene.triangles.len());
         return Err(SceneError::TooFew { name, most, count });
     }
+    let mut are_dark = false;
     for material in &mut scene.materials {
+        // Better no light than light everywhere.
+        if material.emission_texture.is_some() {
+            (material.emission, are_dark) = (Vec3::ZERO, true);
+        }
+        // An alpha without an image needs no coordinates.
+        material.mask = material.mask.filter(|mask| mask.texture.is_none());
         material.texture_uses_mut().for_each(|used| *used = None);
-        material.mask = None;
     }
     let of_vertices = !scene.normals.is_empty() || !scene.colors.is_empty();
     let lost = !scene.textures.is_empty() || of_vertices;
@@ -60,10 +66,12 @@ pub(super) fn with_at_most(mut scene: SceneData, most: usize) -> Result<SceneDat
         textures: Vec::new(),
         ..look
     };
-    let and_lost = if lost {
-        ", without textures and normals and colours of vertices"
-    } else {
-        ""
+    let and_lost = match (lost, are_dark) {
+        (_, true) => {
+            ", without textures, the light of surfaces that one makes glow, and normals and colours of vertices"
+        }
+        (true, false) => ", without textures and normals and colours of vertices",
+        (false, false) => "",
     };
     let note = format!(
         "{count} triangles were reduced to {} by merging vertices{and_lost}",
@@ -108,7 +116,8 @@ fn clustered(scene: &SceneData, cells: u32) -> Vec<(Triangle, u32)> {
     kept
 }
 
-/// Places `copies` copies of a scene apart on a plane, with random turns. Drops vertex normals.
+/// Places `copies` copies of a scene apart on a plane, with random turns, lights included. Drops vertex normals; media stay where they
+/// are.
 ///
 /// # Errors
 /// [`SceneError::TooManyCopies`], or a transform error.
@@ -149,16 +158,23 @@ pub(super) fn on_a_plane(scene: SceneData, copies: usize) -> Result<SceneData, S
     }
     builder.add_object(model);
     builder.add_object(ground(0.5 * spacing * (row + 1) as f32));
+    let (mut lights, near): (Vec<Light>, Vec<Light>) =
+        (scene.lights.iter().cloned()).partition(Light::is_infinite);
+    if !scene.media.is_empty() {
+        let note = "media are not copied, and stay where they are".to_owned();
+        builder.report.warnings.push(note);
+    }
     let mut random = Pcg32::new(1001);
     for index in 0..copies {
         let (sin, cos) = sin_cos_turns(random.uniform());
         let (sin, cos) = (sin as f32, cos as f32);
         let turned = [Vec3::new(cos, 0.0, -sin), Vec3::Y, Vec3::new(sin, 0.0, cos)];
         let place = |k: usize| spacing * (k as f32 - 0.5 * (row - 1) as f32);
-        let to_world = Transform::new(
-            turned,
-            Vec3::new(place(index % row), 0.0, place(index / row)),
-        );
+        let at = Vec3::new(place(index % row), 0.0, place(index / row));
+        let turn = Quat::from_mat3(&Mat3::from_cols(turned[0], turned[1], turned[2]));
+        let moved = |light: &Light| light.clone().moved(turn, at - turn * foot);
+        lights.extend(near.iter().map(moved));
+        let to_world = Transform::new(turned, at);
         let material = |triangle: usize| scene.material_ids[triangle];
         builder.place_looking(0, to_world, material, &scene.uvs, &scene.colors);
     }
@@ -169,6 +185,7 @@ pub(super) fn on_a_plane(scene: SceneData, copies: usize) -> Result<SceneData, S
     let eye = Vec3::new(0.35 * far, 0.35 * far + height, 0.75 * far + spacing);
     let camera = Camera::upright(eye, Vec3::new(0.0, 0.3 * height, 0.1 * far), 45.0);
     let (name, mut look) = taken_apart(scene, &mut builder, Some(camera));
+    look.lights = lights;
     look.materials
         .push(super::Material::diffuse("plane", Vec3::splat(0.5)));
     builder.finish(&name, look)
@@ -329,6 +346,52 @@ mod tests {
         assert!(scene.daylight.is_some());
         assert_eq!(scene.report.warnings.len(), 1, "{:?}", scene.report);
         assert_eq!(scene.environment, Vec3::ONE);
+    }
+
+    #[test]
+    fn lights_go_with_their_copies() {
+        let mut scene = load_default("triangle-soup");
+        let height = 2.0;
+        let at = scene.triangles[7].vertices[1];
+        scene.lights = vec![
+            Light::Point {
+                position: at + height * Vec3::Y,
+                intensity: Vec3::ONE,
+            },
+            Light::Directional {
+                direction: -Vec3::Y,
+                irradiance: Vec3::ONE,
+            },
+        ];
+        let count = scene.triangles.len();
+        let placed = on_a_plane(scene, 3).unwrap();
+        let points: Vec<Vec3> = (placed.lights.iter())
+            .filter_map(|light| match light {
+                Light::Point { position, .. } => Some(*position),
+                _ => None,
+            })
+            .collect();
+        assert_eq!((points.len(), placed.lights.len()), (3, 4));
+        for (copy, light) in points.into_iter().enumerate() {
+            let below = placed.triangles[copy * count + 7].vertices[1];
+            let off = light - (below + height * Vec3::Y);
+            assert!(off.length() < 1e-4, "{copy}: {off}");
+        }
+    }
+
+    #[test]
+    fn fewer_triangles_keep_an_alpha_without_an_image_and_no_light_that_had_one() {
+        let mut scene = load_default("displaced-sphere");
+        let material = &mut scene.materials[0];
+        material.emission = Vec3::ONE;
+        material.mask = Some(crate::AlphaMask::even(0.3));
+        let few = with_at_most(scene.clone(), 500).unwrap();
+        assert_eq!(few.materials[0].mask, scene.materials[0].mask);
+        assert_eq!(few.materials[0].emission, Vec3::ONE);
+        scene.materials[0].emission_texture = Some(crate::TextureUse::plain(0));
+        let few = with_at_most(scene, 500).unwrap();
+        assert_eq!(few.materials[0].emission, Vec3::ZERO);
+        assert!(few.report.warnings[0].contains("the light of"));
     }
 
     #[test]

@@ -11,6 +11,12 @@ pub fn without_overhead(samples: &[f64], empty: f64) -> Vec<f64> {
         .collect()
 }
 
+/// True if most rounds take no longer than an empty one does, within a hundredth: there is no rate to tell.
+pub fn is_hidden(samples: &[f64], empty: f64) -> bool {
+    let hidden = samples.iter().filter(|ms| **ms - empty <= 0.01 * **ms);
+    2 * hidden.count() > samples.len()
+}
+
 /// Rate in millions per second from milliseconds for `items`, median with interval.
 pub fn millions_per_second(ms: &[f64], items: f64) -> Option<Interval> {
     let rates: Vec<f64> = ms.iter().map(|ms| items / ms * 1e-3).collect();
@@ -80,6 +86,19 @@ mod tests {
                 let found = overhead_fault(samples, &empties, wrong);
                 assert!(found.is_some(), "{samples:?} {wrong:?}");
             }
+        }
+    }
+
+    #[test]
+    fn rounds_no_longer_than_an_empty_one_have_no_rate() {
+        for (samples, empty, hidden) in [
+            (&[0.40, 0.42, 0.45, 0.37, 4.9][..], 0.45, true),
+            (&[0.40, 4.2, 4.5, 0.37, 4.9], 0.45, false),
+            (&[0.4545, 0.4545, 0.4545], 0.45, true),
+            (&[0.46, 0.46, 0.46], 0.45, false),
+            (&[0.3], 0.0, false),
+        ] {
+            assert_eq!(is_hidden(samples, empty), hidden, "{samples:?} {empty}");
         }
     }
 

@@ -105,6 +105,12 @@ pub fn mean_interval(samples: &[f64]) -> Option<Interval> {
     interval_of(samples, raw_mean)
 }
 
+/// [`mean`] of positive samples with its 95 % [`positive_interval`]; zero width for one sample.
+pub fn positive_mean_interval(samples: &[f64]) -> Option<Interval> {
+    let estimates = leave_one_out(samples).map(|rest| raw_mean(&rest)).collect();
+    finite(samples).then(|| positive_interval(raw_mean(samples), &[estimates]))?
+}
+
 /// Root mean square with its 95 % [`positive_interval`]; zero width for one square.
 pub fn root_mean_interval(squares: &[f64]) -> Option<Interval> {
     let root = |squares: &[f64]| raw_mean(squares).sqrt();

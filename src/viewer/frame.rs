@@ -84,17 +84,17 @@ pub(crate) fn figures(side: &Side, reference: Option<&Reference>) -> Figures {
     let flip = reference.and(side.flip.as_ref());
     let [width, height] = side.lens.size.map(f64::from);
     let samples = width * height * f64::from(side.shown);
-    let all: u64 = side.rays.iter().sum();
-    let is_counted = all > 0 && side.rays_ms > 0.0;
+    let all: u64 = side.pace.rays.iter().sum();
+    let is_counted = all > 0 && side.pace.rays_ms > 0.0;
     let class = |class: usize| RaysOfClass {
         class: RAY_COUNT_CLASSES[class],
-        per_sample: side.rays[class] as f64 / samples,
-        mrays_s: side.rays[class] as f64 / side.rays_ms / 1e3,
+        per_sample: side.pace.rays[class] as f64 / samples,
+        mrays_s: side.pace.rays[class] as f64 / side.pace.rays_ms / 1e3,
     };
     Figures {
         spp: side.shown,
         of: side.lens.spp,
-        sample_ms: side.history.iter().copied().collect(),
+        sample_ms: side.pace.history.iter().copied().collect(),
         rays: if is_counted {
             (0..TRACED_CLASSES)
                 .map(class)
@@ -103,7 +103,7 @@ pub(crate) fn figures(side: &Side, reference: Option<&Reference>) -> Figures {
         } else {
             Vec::new()
         },
-        mrays_s: is_counted.then(|| all as f64 / side.rays_ms / 1e3),
+        mrays_s: is_counted.then(|| all as f64 / side.pace.rays_ms / 1e3),
         relmse,
         flip: flip.and_then(|flip| flip.value),
         structure: side

@@ -110,6 +110,21 @@ impl<'g> Renderers<'g> {
     }
 }
 
+/// How fast an image goes on.
+#[derive(Debug, Default)]
+pub(crate) struct Pace {
+    /// Samples of pixels per millisecond, as last seen.
+    rate: Option<f64>,
+    /// Milliseconds of each sample of all pixels, the last ones.
+    pub history: VecDeque<f32>,
+    /// Rays of each traced class since the start.
+    pub rays: [u64; TRACED_CLASSES],
+    /// Milliseconds of all samples that the rays are of.
+    pub rays_ms: f64,
+    /// Milliseconds in which the structure followed the last move of the scene.
+    pub update_ms: f64,
+}
+
 /// An image on screen.
 pub(crate) struct Side<'g> {
     pub cell: Cell,
@@ -129,16 +144,7 @@ pub(crate) struct Side<'g> {
     /// Samples per pixel of the image that is shown; 0 of a coarse one.
     pub shown: u32,
     read: Option<Instant>,
-    /// Samples of pixels per millisecond, as last seen.
-    rate: Option<f64>,
-    /// Milliseconds of each sample of all pixels, the last ones.
-    pub history: VecDeque<f32>,
-    /// Rays of each traced class since the start.
-    pub rays: [u64; TRACED_CLASSES],
-    /// Milliseconds of all samples that the rays are of.
-    pub rays_ms: f64,
-    /// Milliseconds in which the structure followed the last move of the scene.
-    update_ms: f64,
+    pub pace: Pace,
     /// Why there is no more to come.
     pub fault: Option<String>,
 }
@@ -167,11 +173,7 @@ impl<'g> Side<'g> {
             done: 0,
             shown: 0,
             read: None,
-            rate: None,
-            history: VecDeque::new(),
-            rays: [0; TRACED_CLASSES],
-            rays_ms: 0.0,
-            update_ms: 0.0,
+            pace: Pace::default(),
             fault,
         }
     }
@@ -184,8 +186,8 @@ impl<'g> Side<'g> {
         self.counting.restart();
         self.flip = None;
         (self.done, self.shown) = (0, 0);
-        self.rays = [0; TRACED_CLASSES];
-        self.rays_ms = 0.0;
+        self.pace.rays = [0; TRACED_CLASSES];
+        self.pace.rays_ms = 0.0;
     }
 
     /// Begins anew over a scene that moved, with the structure that took so long to follow it. What was shown stays until then.
@@ -194,7 +196,7 @@ impl<'g> Side<'g> {
         self.renderers = Renderers::new(gpu, self.cell.clone());
         self.counting = Counting::new(gpu, self.cell.clone());
         self.restart(self.lens);
-        self.update_ms = update_ms;
+        self.pace.update_ms = update_ms;
         match structure {
             Ok(structure) => (self.structure, self.fault) = (Some(structure), None),
             Err(reason) => self.fault = Some(reason),
@@ -215,7 +217,7 @@ impl<'g> Side<'g> {
         let queries = RAY_QUERIES.iter().filter_map(|query| stages.get(*query));
         let traced: Vec<f64> = queries.copied().collect();
         SideTimes {
-            update_ms: self.update_ms,
+            update_ms: self.pace.update_ms,
             render_ms: self.spent_ms(),
             trace_ms: (!traced.is_empty()).then(|| traced.iter().sum()),
         }
@@ -223,7 +225,7 @@ impl<'g> Side<'g> {
 
     /// How much coarser the first image has to be, so that it takes no longer than [`COARSE_MS`].
     fn first_coarse(&self) -> u32 {
-        let Some(rate) = self.rate else {
+        let Some(rate) = self.pace.rate else {
             return COARSEST;
         };
         let pixels = f64::from(self.lens.size[0]) * f64::from(self.lens.size[1]);
@@ -322,7 +324,7 @@ impl<'g> Side<'g> {
         self.image = Some(Arc::new(image));
         self.shown = 0;
         let [width, height] = lens.divided(by).map(f64::from);
-        self.rate = Some(width * height / ms.max(0.1));
+        self.pace.rate = Some(width * height / ms.max(0.1));
         self.by = by / 4;
         Ok(true)
     }
@@ -340,7 +342,7 @@ impl<'g> Side<'g> {
         } else {
             (false, self.done)
         };
-        let last = f64::from(self.history.back().copied().unwrap_or(STEP_MS as f32));
+        let last = f64::from(self.pace.history.back().copied().unwrap_or(STEP_MS as f32));
         let fitting = (STEP_MS / last.max(0.01)).clamp(1.0, 64.0) as u32;
         let count = fitting.min(lens.spp - done);
         let Some(renderer) = self.renderer(1, with) else {
@@ -360,10 +362,10 @@ impl<'g> Side<'g> {
         }
         self.done = done + count;
         let pixels = f64::from(lens.size[0]) * f64::from(lens.size[1]);
-        self.rate = Some(pixels / each.max(0.01));
-        self.history.extend((0..count).map(|_| each as f32));
-        let old = self.history.len().saturating_sub(HISTORY);
-        self.history.drain(..old);
+        self.pace.rate = Some(pixels / each.max(0.01));
+        self.pace.history.extend((0..count).map(|_| each as f32));
+        let old = self.pace.history.len().saturating_sub(HISTORY);
+        self.pace.history.drain(..old);
         Ok(true)
     }
 
@@ -382,8 +384,8 @@ impl<'g> Side<'g> {
         };
         self.image = Some(Arc::new(renderer.image_async().await?));
         let counts = renderer.ray_counts_async().await?;
-        self.rays = std::array::from_fn(|class| counts[class]);
-        self.rays_ms = renderer.spent().ms();
+        self.pace.rays = std::array::from_fn(|class| counts[class]);
+        self.pace.rays_ms = renderer.spent().ms();
         self.shown = self.done;
         self.read = Some(Instant::now());
         Ok(true)

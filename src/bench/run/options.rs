@@ -8,6 +8,7 @@ use raystone_image::FileFormat;
 use std::path::PathBuf;
 
 /// Options of a run that are not part of the experiment.
+// Many fields: one for each option.
 #[derive(Debug, Clone, Default)]
 pub struct RunOptions {
     /// The measuring program, for records.

@@ -18,7 +18,9 @@ use raystone_core::geometry::Camera;
 use raystone_gpu::{Gpu, GpuError, slow_slice};
 use raystone_record::{ClassTiming, CountersPerRay};
 use raystone_stats::interval::Interval;
-use raystone_stats::rates::{millions_per_second, overhead_fault, rate_fault, without_overhead};
+use raystone_stats::rates::{
+    is_hidden, millions_per_second, overhead_fault, rate_fault, without_overhead,
+};
 use raystone_stats::statistics::median;
 use raystone_verify::rays::{RaySet, primary_pixels, primary_rays};
 use raystone_verify::shadow_rays::unlike_shadow;
@@ -131,11 +133,18 @@ pub(super) fn time_all(
             write_failed(session, world, &one.cell, one.record)?;
         } else {
             let rates = one.record.body.timings.iter().map(|t| t.mrays_s.value);
-            one.speed = rates.map(f64::ln).sum();
+            // A class without a speed counts for nothing.
+            one.speed = mean_of_logs(rates);
             kept.push(one);
         }
     }
     Ok(kept)
+}
+
+/// The mean of the logarithms, by which structures are ranked that may have been timed by other classes; 0 of none.
+fn mean_of_logs(rates: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = rates.len().max(1) as f64;
+    rates.map(f64::ln).sum::<f64>() / count
 }
 
 /// Rays of a class, ready to be traced through a structure.
@@ -257,7 +266,15 @@ fn class_timing(
             count_work(gpu, triangles, &one.traced, set.query(), &set.rays)
         })
         .map_err(text)?;
-    let ms = without_overhead(&samples.ms, median(&empties).unwrap_or(0.0));
+    let empty = median(&empties).unwrap_or(0.0);
+    if is_hidden(&samples.ms, empty) {
+        session.tell_warning(&format!(
+            "{}, {:?} rays: no speed, since a dispatch of nothing takes as long ({empty:.3} ms): raise timing.rays",
+            one.cell, set.class
+        ));
+        return Ok(None);
+    }
+    let ms = without_overhead(&samples.ms, empty);
     let rays = set.rays.len() as f64;
     let rate = millions_per_second(&ms, rays);
     let fault = overhead_fault(&samples.ms, &empties, &ms)

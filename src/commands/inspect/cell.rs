@@ -131,6 +131,11 @@ fn command(inventory: &Inventory, cell: &Cell) -> String {
     }
     let axes = &inventory.experiment.axes;
     for (axis, label) in variants(cell).filter(|(axis, _)| axes[*axis].len() > 1) {
+        // A name fits all its variants.
+        let is_name = axes[axis]
+            .iter()
+            .any(|v| v.name == label && v.label != label);
+        let label = format!("{label}{}", if is_name { "()" } else { "" });
         command += &format!(" --only {}", shell_word(&format!("{axis}={label}")));
     }
     command

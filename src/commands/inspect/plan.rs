@@ -4,6 +4,7 @@ use super::Inspect;
 use crate::commands::arguments::plan;
 use anyhow::Result;
 use raystone::config::{Axis, Experiment, Plan as Cells, Skipped};
+use raystone::report::format::plural;
 use raystone::run::{Cost, Unit, shards};
 use raystone::text::shell_word;
 use serde_json::{Value, json};
@@ -34,7 +35,8 @@ pub(super) fn inspect(command: &Inspect) -> Result<ExitCode> {
     } else {
         let left_out: usize = cells.skipped.iter().map(|s| s.cells).sum();
         let count = units.len();
-        writeln!(text, "{count} cells, {left_out} left out; {of} shards:\n")?;
+        let (cells, shards) = (plural(count, "cell"), plural(of, "shard"));
+        writeln!(text, "{cells}, {left_out} left out; {shards}:\n")?;
         describe(&mut text, (&units, &numbers), of, &cost)?;
         writeln!(text, "\n{}", how_to_run(command, of))?;
     }

@@ -1,12 +1,12 @@
 //! `raystone points --plot`.
 
 use super::{Points, Stream, fraction};
-use crate::commands::output::print;
 use anyhow::{Context as _, Result, bail};
 use raystone::discrepancy::PointSet;
 use raystone::report::plot::points::{MOST_DRAWN, thinned};
 use raystone::report::point_page::{PointPage, document};
 use raystone::report::write_page;
+use serde_json::json;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -40,7 +40,8 @@ impl Points {
         };
         let mut document = document(&page)?;
         let (html, _) = write_page(folder, &mut document)?;
-        print(&format!("page: {}\n", html.display()))?;
+        let text = format!("page: {}\n", html.display());
+        self.output.show("points", json!({ "page": html }), &text)?;
         Ok(ExitCode::SUCCESS)
     }
 

@@ -129,6 +129,7 @@ pub enum Part {
 }
 
 /// The passes with what they leave for each other.
+// Many fields: what the passes read, and what each leaves until something before it changes.
 pub struct Pipeline {
     player: Player,
     volume: Volume,

@@ -105,7 +105,7 @@ impl Drift {
         let logs: Vec<f64> = of_it.map(|c| c.log).collect();
         let least = logs.iter().copied().fold(f64::INFINITY, f64::min);
         let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let square = logs.iter().map(|x| x * x).sum::<f64>() / logs.len() as f64;
+        let square = logs.iter().map(|x| x.exp_m1().powi(2)).sum::<f64>() / logs.len() as f64;
         format!(
             "{figure}: times of {} with equal kernels and work moved by {:+.1} to {:+.1} % (root mean square {:.1} %)",
             plural(logs.len(), "cell"),

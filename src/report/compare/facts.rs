@@ -7,6 +7,9 @@ use raystone_record::figure::{Better, Figure, Shown, Spread};
 use raystone_record::*;
 use raystone_stats::bias::BiasVerdict;
 
+/// The id of the verdict of a structure's gate.
+pub(crate) const GATE: &str = "gate/v1";
+
 /// Returns verdicts and hashes of a run.
 pub(super) fn facts(data: &RunData) -> Vec<Taken> {
     let mut all = Vec::new();
@@ -14,7 +17,7 @@ pub(super) fn facts(data: &RunData) -> Vec<Taken> {
         for s in scene.structures.iter().filter(|s| !s.refused) {
             let fault = s.fault();
             let text = fault.as_deref().unwrap_or("PASS");
-            all.push(fact(&s.key, "gate/v1", "gate", text, fault.is_some()));
+            all.push(fact(&s.key, GATE, "gate", text, fault.is_some()));
         }
         for view in &scene.views {
             view.times.iter().for_each(|t| all.extend(of_cell(t)));

@@ -102,7 +102,10 @@ pub fn compare(figure: &Figure, a: &Evidence, b: &Evidence, effects: &Effects) -
     match (a, b) {
         (Evidence::Exact(a), Evidence::Exact(b)) => exact(figure, *a, *b, effects),
         (Evidence::Once(a), Evidence::Once(b)) if a == b => known(ChangeVerdict::Same, ""),
-        (Evidence::Once(_), Evidence::Once(_)) => known(ChangeVerdict::Told, "measured once"),
+        (Evidence::Once(_), Evidence::Once(_)) => known(
+            ChangeVerdict::Told,
+            "measured once, or recorded without its rounds",
+        ),
         (
             Evidence::Fact {
                 text: a,
@@ -110,6 +113,13 @@ pub fn compare(figure: &Figure, a: &Evidence, b: &Evidence, effects: &Effects) -
             },
             Evidence::Fact { text: b, fails: is },
         ) => facts(a, b, [*was, *is]),
+        (Evidence::Untrusted(a), Evidence::Untrusted(b)) if a == b => {
+            known(ChangeVerdict::Same, "")
+        }
+        (Evidence::Untrusted(_), _) | (_, Evidence::Untrusted(_)) => known(
+            ChangeVerdict::Undecided,
+            "the interval is not to be trusted (‡): few pixels decide",
+        ),
         (Evidence::Summary(a, m), Evidence::Summary(b, n)) => {
             summaries(figure, (*a, *m), (*b, *n), effects)
         }

@@ -6,7 +6,7 @@
 //! verdicts, and [`show`] writes them.
 
 pub mod drift;
-mod facts;
+pub(crate) mod facts;
 pub mod judge;
 pub mod show;
 pub mod side;

@@ -130,6 +130,8 @@ impl Side {
         };
         let labels = match (labels, &found[..]) {
             (Some(labels), _) => labels.map(str::to_owned),
+            // The program's own are what others are held against, whichever was recorded first.
+            (None, [a, b]) if b == EMBEDDED => [b.clone(), a.clone()],
             (None, [a, b]) => [a.clone(), b.clone()],
             (None, []) => {
                 return Err(error(

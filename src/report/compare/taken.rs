@@ -34,6 +34,8 @@ pub enum Evidence {
     },
     /// No more than an interval that is about Student's with so many degrees of freedom.
     Summary(Interval, f64),
+    /// An interval that is not to be trusted: seeds that all missed the decisive pixel agree with each other for that reason.
+    Untrusted(Interval),
     /// A number that was measured once.
     Once(f64),
     /// A verdict or a hash.
@@ -132,10 +134,10 @@ fn is_among(figures: &[&Figure], id: &str) -> bool {
 /// Returns `true` if a figure is of rays or pictures of the seed of the run alone, or of few seeds. Errors are known seed by
 /// seed, and structures depend on none.
 fn is_of_one_seed(taken: &Taken) -> bool {
-    if let Evidence::Summary(_, freedom) = taken.evidence
-        && freedom < FEWEST_FREE
-    {
-        return true;
+    match taken.evidence {
+        Evidence::Summary(_, freedom) if freedom < FEWEST_FREE => return true,
+        Evidence::Untrusted(_) => return true,
+        _ => {}
     }
     let of_seeds = matches!(
         taken.evidence,
@@ -212,7 +214,8 @@ fn is_like(a: &Evidence, b: &Evidence) -> bool {
             let of = |seed: u32| a.iter().find(|(s, _)| *s == seed).map(|(_, x)| *x);
             a.len() == b.len() && b.iter().all(|(s, y)| of(*s).is_some_and(|x| near(x, *y)))
         }
-        (Evidence::Summary(a, _), Evidence::Summary(b, _)) => near(a.value, b.value),
+        (Evidence::Summary(a, _), Evidence::Summary(b, _))
+        | (Evidence::Untrusted(a), Evidence::Untrusted(b)) => near(a.value, b.value),
         (Evidence::Exact(a), Evidence::Exact(b)) => near(*a, *b),
         (Evidence::Fact { text: a, .. }, Evidence::Fact { text: b, .. }) => a == b,
         _ => true,
@@ -271,10 +274,8 @@ fn of_value(data: &RunData, of_seeds: &Seeds, value: &Value) -> Option<Taken> {
         seed: None,
         kernel: value.source.kernel.to_owned(),
     };
-    // Seeds that all missed the decisive pixel agree with each other for that reason: with one degree of freedom, any difference is
-    // undecided.
     if value.is_heavy_tailed() {
-        own.evidence = Evidence::Summary(number, 1.0);
+        own.evidence = Evidence::Untrusted(number);
     }
     if let Some((evidence, work)) = of_seeds.get(&own.identity()) {
         if !value.is_heavy_tailed() {
@@ -393,7 +394,7 @@ fn of_sampler(view: &View, sampler: &MeasuredSampler) -> Seeds {
             let root = |values: &[f64]| mean(values).map_or(f64::NAN, f64::sqrt);
             put(
                 &key,
-                metric.figure(),
+                sampler.figure(metric),
                 match metric {
                     Metric::RelMse => values,
                     Metric::Rmse => pseudo_values(&values, root),

@@ -64,7 +64,7 @@ fn repetitions(family: usize, samples: &Samples) -> Vec<Json> {
             "label": label,
         });
         if let Some(rays) = samples.rays.filter(|_| *ms > 0.0) {
-            entry["items_per_second"] = json!(rays as f64 / (ms * 1e-3));
+            entry["items_per_second"] = json!(rays / (ms * 1e-3));
         }
         entry
     };

@@ -80,7 +80,7 @@ impl History<'_> {
         }
         if self.left_out > 0 {
             text += &format!(
-                " {} values are no numbers and were left out.",
+                " {} values are no numbers, or have no interval to be trusted, and were left out.",
                 self.left_out
             );
         }

@@ -1,11 +1,13 @@
 //! Reasons to believe the figures: every check of the run, with its evidence.
 
 use super::targets;
-use crate::data::{Measured, RunData, SAMPLER_AXES, SceneGroup, without_repeats};
+use crate::data::{Measured, RunData, SAMPLER_AXES, SceneGroup, View, without_repeats};
 use crate::document::*;
 use crate::format::{self, count, plural};
-use crate::samplers::REFERENCE_SHARE;
-use raystone_record::{GateVerdict, PathsRecord, ReferenceCheck, TimeRecord, Verdict, axis};
+use crate::samplers::{Metric, REFERENCE_SHARE, UNRESOLVED};
+use raystone_record::{
+    GateVerdict, PathsRecord, ReferenceCheck, ReferenceRecord, TimeRecord, Verdict, axis,
+};
 use raystone_stats::bias::BiasVerdict;
 
 /// Returns the section.
@@ -275,12 +277,11 @@ fn reference_noise(data: &RunData) -> Check {
             None if fault.is_none() => continue,
             None => "no reference".into(),
             Some(reference) => {
-                tested = true;
-                let spp = count(u64::from(reference.spp));
+                tested |= reference.file.is_none();
                 match (reference.exact, &reference.file) {
                     (Some(_), _) => "exact".into(),
                     (None, Some(file)) => format!("{file}, of unknown noise"),
-                    _ => format!("MSE {} at {spp} spp", format::optional(reference.mse)),
+                    _ => noise_of(&reference, view),
                 }
             }
         };
@@ -290,6 +291,24 @@ fn reference_noise(data: &RunData) -> Check {
     let share = format::percent(REFERENCE_SHARE);
     let title = format!("Reference noise below {share} of every error");
     check(title, tested, wrong, join(details))
+}
+
+/// Describes the noise of a rendered reference, and how many errors it hides.
+fn noise_of(reference: &ReferenceRecord, view: &View) -> String {
+    let mut text = format!("MSE {}", format::optional(reference.mse));
+    if let Some(relmse) = reference.relmse {
+        text += &format!(", relMSE {}", format::number(relmse));
+    }
+    text += &format!(" at {} spp", count(u64::from(reference.spp)));
+    let errors = view
+        .samplers
+        .iter()
+        .flat_map(|s| s.mean_errors(Metric::RelMse));
+    let hidden = errors.filter(|mean| !mean.resolved).count();
+    if hidden > 0 {
+        text += &format!(", {} {UNRESOLVED}", plural(hidden, "error"));
+    }
+    text
 }
 
 fn complete(data: &RunData) -> Check {

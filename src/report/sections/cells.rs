@@ -1,12 +1,13 @@
 //! Every cell: its key, its kernels, its figures, and the command that repeats it.
 
+use crate::compare::side::EMBEDDED;
 use crate::data::RunData;
 use crate::document::*;
 use crate::format;
 use crate::values::Value;
 use raystone_config::Axis;
 use raystone_record::{Key, Ran, axis};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Cells that the page itself holds; more are in a file of their own.
 pub(crate) const MOST_INSIDE: usize = 200;
@@ -23,6 +24,8 @@ pub struct Cells<'a> {
 
 struct Cell<'a> {
     key: Key,
+    /// The key by labels that no other cell fits.
+    alone: Key,
     ran: Option<&'a Ran>,
     values: Vec<&'a Value<'a>>,
 }
@@ -62,6 +65,7 @@ impl<'a> Cells<'a> {
             let place = *places.entry(name.clone()).or_insert_with(|| {
                 let ran = ran.get(&name).copied();
                 found.push(Cell {
+                    alone: key.clone(),
                     key,
                     ran,
                     values: Vec::new(),
@@ -76,12 +80,14 @@ impl<'a> Cells<'a> {
             let key = of_cell(&time.key);
             if !places.contains_key(&key.to_string()) {
                 found.push(Cell {
+                    alone: key.clone(),
                     key,
                     ran: Some(time.ran),
                     values: Vec::new(),
                 });
             }
         }
+        tell_apart(&mut found);
         Self { values, found }
     }
 
@@ -160,7 +166,7 @@ impl Cell<'_> {
         let facts = facts.map(|(what, text)| [what.into(), text.into()]);
         blocks.extend(Table::of("What it is", &["axis", ":value"], facts).into_block());
         if let Some(run) = data.run {
-            let command = command(&run.experiment, &run.experiment_text, &self.key);
+            let command = command(&run.experiment, &run.experiment_text, &self.alone);
             blocks.push(Block::Verbatim(command));
         }
         blocks.extend(self.figures().into_block());
@@ -197,6 +203,37 @@ impl Cell<'_> {
     }
 }
 
+/// Cells whose labels are the names of others, too, get labels that fit them alone: `bvh()` beside `bvh(leaf_size=2)`, and the
+/// embedded kernels beside others.
+fn tell_apart(cells: &mut [Cell]) {
+    let labels = cells.iter().flat_map(|cell| cell.key.labels());
+    let labels: BTreeSet<(String, String)> = labels
+        .map(|(axis, label)| (axis.to_owned(), checked(label).to_owned()))
+        .collect();
+    let has_kernels = labels.iter().any(|(axis, _)| axis == axis::KERNELS);
+    let has_variants = |axis: &str, name: &str| {
+        let begin = format!("{name}(");
+        let mut others = labels.iter().filter(|(other, _)| other == axis);
+        others.any(|(_, label)| label.starts_with(&begin))
+    };
+    for cell in cells {
+        for (axis, label) in cell.key.labels() {
+            if has_variants(axis, checked(label)) {
+                let alone = cell.alone.clone();
+                cell.alone = alone.with(axis, format!("{}()", checked(label)));
+            }
+        }
+        if has_kernels && cell.key.label(axis::KERNELS).is_empty() {
+            cell.alone = cell.alone.clone().with(axis::KERNELS, EMBEDDED);
+        }
+    }
+}
+
+/// Returns a label as an experiment names it.
+fn checked(label: &str) -> &str {
+    label.strip_suffix(" (unchecked)").unwrap_or(label)
+}
+
 /// Returns the command that repeats a cell: names with special characters of patterns or shells are replaced by
 /// patterns that match them.
 fn command(file: &str, text: &str, key: &Key) -> String {
@@ -207,10 +244,7 @@ fn command(file: &str, text: &str, key: &Key) -> String {
     for set in sets {
         command += &format!(" --set {}", quoted(&visible(set)));
     }
-    let of = |(axis, label): (&str, &str)| {
-        let checked = label.strip_suffix(" (unchecked)").unwrap_or(label);
-        format!("{axis}={}", pattern(checked))
-    };
+    let of = |(axis, label): (&str, &str)| format!("{axis}={}", pattern(checked(label)));
     let only = key.labels().map(of);
     let only: Vec<String> = only.collect();
     command + &format!(" --only {}", quoted(&only.join(",")))
@@ -259,6 +293,46 @@ fn quoted(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_command_repeats_its_cell_alone() {
+        let cell = |accel: &str, kernels: Option<&str>| {
+            let key = Key::default()
+                .with(axis::SCENE, "box")
+                .with(axis::ACCEL, accel);
+            let key = match kernels {
+                Some(label) => key.with(axis::KERNELS, label),
+                None => key,
+            };
+            Cell {
+                alone: key.clone(),
+                key,
+                ran: None,
+                values: Vec::new(),
+            }
+        };
+        let only = |mut cells: Vec<Cell>| {
+            tell_apart(&mut cells);
+            let line = |cell: &Cell| command("a.toml", "", &cell.alone);
+            let lines = cells.iter().map(line);
+            lines
+                .map(|line| line.replace("raystone run a.toml --only ", ""))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            only(vec![
+                cell("bvh (unchecked)", None),
+                cell("bvh(leaf_size=2) (unchecked)", None),
+                cell("bvh4", Some("idea"))
+            ]),
+            [
+                "'scene=box,accel=bvh(),kernels=embedded'",
+                "'scene=box,accel=bvh(leaf_size=2),kernels=embedded'",
+                "scene=box,accel=bvh4,kernels=idea"
+            ]
+        );
+        assert_eq!(only(vec![cell("bvh", None)]), ["scene=box,accel=bvh"]);
+    }
 
     #[test]
     fn a_command_is_one_line_whatever_stands_in_names() {

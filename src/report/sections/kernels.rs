@@ -2,6 +2,7 @@
 //! gain of leaving them out.
 
 use super::specs::GAINS;
+use crate::compare::facts::GATE;
 use crate::compare::judge::ChangeVerdict;
 use crate::compare::show::change;
 use crate::compare::side::{EMBEDDED, Side};
@@ -85,7 +86,13 @@ fn structures(data: &RunData, found: &Comparison) -> Vec<[TableCell; 3]> {
         } else {
             structure
         };
-        let (answer, tone) = answer(&findings);
+        let is_gate = |f: &&Finding| f.figure.id == GATE && f.key.only(&WHERE) == key;
+        let mut gates = found.findings.iter().filter(is_gate);
+        let (answer, tone) = if gates.any(|gate| gate.verdict == ChangeVerdict::Worse) {
+            ("FAILED the gate".to_owned(), Tone::Bad)
+        } else {
+            answer(&findings)
+        };
         // If some kernels of a structure changed, the times of the others are no part of the answer.
         let all_are = findings.iter().all(|f| f.is_control);
         let told = findings.iter().filter(|f| all_are || !f.is_control);

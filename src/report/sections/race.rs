@@ -131,7 +131,7 @@ impl<'a> Race<'a> {
     /// Returns the efficiency of each: error × time at the common spp, errors at the end of the race, samples and
     /// seconds to an error.
     pub(crate) fn values(&self) -> Vec<Value<'static>> {
-        let metric = Metric::RelMse.name();
+        let metric = &self.view.figure(Metric::RelMse).title;
         let (common, target) = (self.view.common_spp(), self.target());
         let mut values = Vec::new();
         for sampler in &self.view.samplers {

@@ -30,7 +30,8 @@ pub(crate) fn error_figures(
     values: &[Value],
     metric: Metric,
 ) -> [Option<Illustration>; 2] {
-    let (name, figure) = (metric.name(), metric.figure());
+    let figure = view.figure(metric);
+    let name = &figure.title;
     let hidden = values
         .iter()
         .filter(|v| v.figure.id == figure.id && v.is_unresolved());
@@ -129,7 +130,7 @@ pub(crate) fn pareto_figure(data: &RunData, stem: &str, view: &View) -> Option<I
     for (point, place) in known.into_iter().zip(places(&figures)) {
         points[point].place = place;
     }
-    let name = Metric::RelMse.name();
+    let name = &view.figure(Metric::RelMse).title;
     let plot = ParetoPlot {
         x_title: format!("render time for {spp} spp, seconds"),
         y_title: format!("{name} at {spp} spp"),

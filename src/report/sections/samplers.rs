@@ -86,7 +86,7 @@ fn measured(
 /// Returns the table of mean error per spp, slope and bias verdict.
 pub fn error_table(names: &Names, view: &View, values: &[Value], metric: Metric) -> Table {
     let id = view.samplers.iter().find_map(|s| s.metric_id(metric));
-    let shown = [metric.figure(), metric.slope_figure()];
+    let shown = [view.figure(metric), metric.slope_figure()];
     let of_metric = values
         .iter()
         .filter(|v| shown.iter().any(|f| f.id == v.figure.id));
@@ -115,7 +115,7 @@ pub fn error_table(names: &Names, view: &View, values: &[Value], metric: Metric)
     let rows = measured(view, |s| {
         TableCell::repeats(s.replicates.len(), !s.is_deterministic())
     });
-    let words = [metric.name(), &view.name, &id, &notes];
+    let words = [&*shown[0].title, &view.name, &id, &notes];
     let spec = TableSpec {
         figures: &shown,
         ..ERRORS

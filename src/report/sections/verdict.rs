@@ -332,8 +332,8 @@ pub(crate) fn rulings(scene: &SceneGroup) -> Vec<(String, Ruling)> {
         let question = format!("fastest for rendering: {} (ms per spp)", view.name);
         rulings.push((question, rendering::fastest(scene, view)));
     }
-    let metric = Metric::RelMse.name();
     for view in &scene.views {
+        let metric = &view.figure(Metric::RelMse).title;
         if let Some(spp) = view.common_spp() {
             let what = format!("{}, {metric} at {spp} spp", view.name);
             rulings.push((
@@ -365,7 +365,11 @@ fn table_of(caption: &str, rulings: &[(String, Ruling)]) -> Table {
     // Questions whose answer is withheld by one failed check share a row.
     let withheld = by_answer(withheld).into_iter().map(|(questions, ruling)| {
         let (short, all) = (together(&questions), questions.join("; "));
-        let detail = if short == all { String::new() } else { all };
+        let detail = if short == all {
+            String::new()
+        } else {
+            format!("({all})")
+        };
         row(TableCell::with_detail(short, detail), &ruling)
     });
     let heads = [
@@ -520,6 +524,6 @@ pub(crate) fn best_per_sample(view: &View, spp: u32) -> Ruling {
 pub(super) fn rank(view: &View, contenders: Vec<Contender>) -> Ruling {
     match trust::doubt_of_errors(view) {
         Some(reason) => Ruling::Withheld(reason),
-        None => judge(contenders, Metric::RelMse.figure().better),
+        None => judge(contenders, view.figure(Metric::RelMse).better),
     }
 }

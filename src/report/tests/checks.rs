@@ -33,6 +33,66 @@ fn an_image_that_no_other_structure_rendered_proves_nothing() {
     assert_eq!(failing(&lone), open);
 }
 
+/// Returns a clean run whose errors are against a file, of which nothing is known.
+fn against_a_file() -> Vec<Line> {
+    let mut lines = clean_run();
+    for line in &mut lines {
+        match &mut line.body {
+            Body::Reference(reference) => {
+                reference.file = Some("mine.exr".to_owned());
+                (reference.mse, reference.relmse) = (None, None);
+            }
+            Body::Error(error) => {
+                for at in &mut error.errors {
+                    let metrics = std::mem::take(&mut at.metrics).into_iter();
+                    let plain = metrics.map(|(id, value)| (id.replace("-unbiased", ""), value));
+                    at.metrics = plain.collect();
+                }
+            }
+            _ => {}
+        }
+    }
+    lines
+}
+
+#[test]
+fn a_reference_of_unknown_noise_proves_nothing_and_its_errors_are_not_called_unbiased() {
+    let lines = against_a_file();
+    let open = failing(&lines);
+    assert!(
+        matches!(&open[..], [(title, Verdict::Open)] if title.contains("Reference noise")),
+        "{open:?}"
+    );
+    let shown = terminal::terminal_tables(&lines);
+    assert!(
+        shown.contains("relMSE") && !shown.contains("unbiased"),
+        "{shown}"
+    );
+    let data = RunData::new(&lines);
+    let ids: Vec<String> = data
+        .views()
+        .flat_map(|(scene, view)| values::of_view(&data, scene, view))
+        .map(|value| value.figure.id.to_string())
+        .collect();
+    let has = |id: &str| ids.iter().any(|other| other == id);
+    assert!(has("relmse/v1") && has("rmse/v1"), "{ids:?}");
+    assert!(!has("relmse-unbiased/v1") && !has("rmse-unbiased/v1"));
+}
+
+#[test]
+fn a_cell_that_failed_has_no_image_that_differs() {
+    let lines = changed(|_, body| {
+        if let Body::Time(time) = body {
+            (time.failure, time.image_equal) = (Some("its gate failed".to_owned()), false);
+        }
+    });
+    let data = RunData::new(&lines);
+    for (scene, view) in data.views() {
+        let doubt = trust::doubt_of_rendering(scene, view);
+        assert!(doubt.is_none_or(|why| !why.contains("the image of")));
+    }
+}
+
 /// A fault in the records of one kind.
 macro_rules! plant {
     ($kind:ident, $record:ident => $fault:expr) => {

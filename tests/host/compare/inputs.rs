@@ -336,6 +336,15 @@ fn two_sets_of_kernels_of_one_run_are_its_two_sides() {
         "{:?}",
         found.findings[0]
     );
+    // Records of the idea come first where its gate failed: it is the candidate all the same.
+    let mut turned = run.clone();
+    turned.lines.reverse();
+    assert_eq!(turned.kernels(), ["idea", "embedded"]);
+    let names = |run: &Side| {
+        let sides = run.of_kernels(None).expect("two sides");
+        sides.map(|side| side.name.clone())
+    };
+    assert_eq!(names(&turned), names(&run));
     assert!(run.of_kernels(Some(["embedded", "other"])).is_err());
     assert!(
         base.side()

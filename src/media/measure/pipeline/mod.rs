@@ -77,6 +77,7 @@ parameters! {
     }
 
     /// photons of a lamp through a medium into a grid of radiance, evenly or by a map of importance, by one strategy of scatter, and an image of it (Pfeuti 2009)
+    // Many fields: one for each parameter.
     struct Load {
         /// how energy is added to the grid
         strategy: Strategy = Strategy::Swap;
