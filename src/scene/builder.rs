@@ -217,11 +217,16 @@ impl SceneBuilder {
         &self.triangles
     }
 
+    /// The material of each triangle.
+    pub(crate) fn material_ids(&self) -> &[u32] {
+        &self.material_ids
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.triangles.len()
     }
 
-    /// Says that f32 has rounded the coordinates of a text noticeably, if the model lies so far from
+    /// Says that f32 has rounded the coordinates of a file noticeably, if the model lies so far from
     /// the origin, as those of surveyors do.
     pub(crate) fn note_far(&mut self) {
         let corners = || self.triangles.iter().flat_map(|t| t.vertices);

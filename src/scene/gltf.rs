@@ -9,7 +9,7 @@ use super::gltf_files::Files;
 use super::gltf_notes::Notes;
 use super::gltf_pose::Pose;
 use super::gltf_roots::roots;
-use super::texture::decode_all;
+use super::texture::{decode_all, forget_unused};
 use super::{InstanceError, Light, LoadOptions, Material, SceneData, SceneError, Transform};
 use super::{gltf_container, gltf_instancing, gltf_lights, gltf_material};
 use glam::{Mat4, Quat, Vec3, Vec4};
@@ -129,6 +129,8 @@ fn build(
     builder.report.warnings.extend(notes.warnings());
     builder.report.warnings.append(&mut files.others.take());
     builder.report.warnings.append(&mut palette.warnings);
+    builder.note_far();
+    forget_unused(&mut palette.materials, builder.material_ids());
     let textures = decode_all(
         &palette.images,
         options.texture_limits(builder.len()),

@@ -259,3 +259,4 @@ mod accessors;
 mod files;
 mod materials;
 mod nodes;
+mod poses;

@@ -235,6 +235,12 @@ impl<'a> Data<'a> {
         stride(view).or_else(|| stride(packed?))
     }
 
+    /// True for an accessor of no elements, which exporters write for parts without any.
+    pub(crate) fn is_empty(&self, index: usize) -> bool {
+        let accessor = self.document.at("accessors", index);
+        accessor.and_then(|accessor| accessor.index("count")) == Some(0)
+    }
+
     /// Reads an accessor: zeros or a part of a view, with its sparse values laid over.
     ///
     /// # Errors

@@ -146,7 +146,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(Value, Option<String>), String> {
 }
 
 /// The text without what exporters write against the rules of JSON: NaN and infinities (null
-/// instead), commas before a closing bracket, stray backslashes and control characters in texts.
+/// instead), commas before a closing bracket, stray backslashes, control characters and halves of letters in texts.
 fn mended(text: &str) -> String {
     let mut mended = String::with_capacity(text.len());
     let mut letters = text.chars().peekable();
@@ -160,6 +160,12 @@ fn mended(text: &str) -> String {
             '\\' if in_text => {
                 mended.push(letter);
                 match letters.next_if(|next| r#""\/bfnrtu"#.contains(*next)) {
+                    Some('u') => {
+                        let ahead: String = letters.clone().take(10).collect();
+                        let (kept, letter) = escaped(&ahead);
+                        mended += &letter;
+                        letters.by_ref().take(kept).for_each(drop);
+                    }
                     Some(next) => mended.push(next),
                     None => mended.push('\\'),
                 }
@@ -181,7 +187,8 @@ fn mended(text: &str) -> String {
                 }
                 // `NaN`, `-inf`, `1.#IND`, `-nan(ind)`: all have an n, which no number has.
                 let word = &mended[start..];
-                if word != "null" && word.contains(['n', 'N']) {
+                let is_huge = word.parse().is_ok_and(f64::is_infinite);
+                if word != "null" && (is_huge || word.contains(['n', 'N'])) {
                     mended.replace_range(start.., "null");
                 }
             }
@@ -191,6 +198,43 @@ fn mended(text: &str) -> String {
     mended
 }
 
+/// Of the letters behind `\`, from `u` on: how many of them are done with, and what is written in their place. Half of a
+/// pair of surrogates alone is no letter.
+fn escaped(ahead: &str) -> (usize, String) {
+    let unit = |at: usize| u16::from_str_radix(ahead.get(at..at + 4)?, 16).ok();
+    match (unit(0), ahead.get(4..6), unit(6)) {
+        (Some(0xd800..0xdc00), Some("\\u"), Some(0xdc00..0xe000)) => (10, format!("u{ahead}")),
+        (Some(0xd800..0xe000), ..) => (4, "ufffd".to_owned()),
+        _ => (0, "u".to_owned()),
+    }
+}
+
 fn is_of_word(letter: char) -> bool {
     letter.is_ascii_alphanumeric() || "+-.#()".contains(letter)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_of_letters_and_numbers_beyond_all_are_mended_and_whole_ones_stay() {
+        for (written, expected) in [
+            (r#""K\udcf6rper""#, "K\u{fffd}rper".into()),
+            (r#""\ud83d""#, "\u{fffd}".into()),
+            (r#""\ud83d\u0041""#, "\u{fffd}A".into()),
+            (
+                r#""\ud83d\ud83d\ude00\u00e4\\u""#,
+                "\u{fffd}\u{1f600}\u{e4}\\u".into(),
+            ),
+            ("1e400", Value::Null),
+            ("-1E+999", Value::Null),
+            ("1e300,", 1e300.into()),
+        ] {
+            let text = format!("[{written}]");
+            let (value, fault) = parse(text.as_bytes()).expect(written);
+            assert_eq!(value[0], expected, "{written}");
+            assert!(fault.is_some(), "{written}");
+        }
+    }
 }

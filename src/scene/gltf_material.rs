@@ -8,7 +8,7 @@ use super::gltf_texture::{Images, Placed};
 use super::material::{Description, Format, emitted};
 use super::texture::ImageSource;
 use super::{
-    AlphaChannel, AlphaMask, DIELECTRIC, DIFFUSE, LoadOptions, MIRROR, Material, MaterialSource,
+    AlphaChannel, AlphaMask, DIELECTRIC, DIFFUSE, LoadOptions, Material, MaterialSource,
     NAMES_IN_WARNING, PRINCIPLED, approximation_warning,
 };
 use glam::{Vec3, Vec4, Vec4Swizzles};
@@ -96,16 +96,15 @@ fn textured<'a>(
         left_out |= !is_ours;
         is_ours.then_some(placed.place)
     };
-    let color = base_color(material).1.filter(|_| found.kind != &MIRROR);
+    let color = base_color(material).1;
     found.base_color_texture = color.and_then(|info| take(images.place(info)));
-    if found.kind == &PRINCIPLED {
+    // With the gloss of an extension it belongs to a fallback.
+    if found.kind == &PRINCIPLED && !material.extension(GLOSSY).is_given() {
         let varied = texture(material.get(METALLIC), "metallicRoughnessTexture");
         let varied = varied.and_then(|info| take(images.place(info)));
         found.metallic_roughness_texture = varied;
     }
-    if found.kind != &DIELECTRIC
-        && let Some(bent) = texture(material, "normalTexture")
-    {
+    if let Some(bent) = texture(material, "normalTexture") {
         let mut placed = images.place(bent);
         placed.place.scale = bent.number("scale").unwrap_or(1.0);
         found.normal_texture = take(placed);
@@ -239,7 +238,7 @@ fn convert(
     let description = Description {
         format: Format::Gltf,
         base_color: color.xyz(),
-        is_varied: has(model, "metallicRoughnessTexture")
+        is_varied: gloss.is_none() && has(model, "metallicRoughnessTexture")
             || transmission.is_some_and(|t| has(t, "transmissionTexture")),
         is_followed: options.textures,
         source: &source,

@@ -41,6 +41,9 @@ const LISTS: [(&str, &str); 13] = [
 /// `magFilter` of a sampler that does not interpolate.
 const NEAREST: usize = 9728;
 
+/// `wrapS` and `wrapT` of the standard: repeat, clamp, mirror.
+const WRAPS: [usize; 3] = [10_497, 33_071, 33_648];
+
 /// How often something was met, and the first place of it.
 struct Met {
     count: usize,
@@ -94,6 +97,17 @@ impl Notes {
         for (index, sampler) in document.list("samplers").enumerate() {
             if sampler.index("magFilter") == Some(NEAREST) {
                 let what = "samplers ask for the nearest texel: four are interpolated";
+                self.tell(what, || sampler.place("sampler", index));
+            }
+            let is_odd = |key: &str| {
+                let wrap = sampler.get(key).given();
+                wrap.is_some_and(|wrap| wrap.as_index().is_none_or(|code| !WRAPS.contains(&code)))
+            };
+            let mut textures = document.list("textures");
+            if textures.any(|texture| texture.index("sampler") == Some(index))
+                && ["wrapS", "wrapT"].into_iter().any(is_odd)
+            {
+                let what = "samplers wrap in an unknown way: their textures repeat";
                 self.tell(what, || sampler.place("sampler", index));
             }
         }

@@ -2,8 +2,9 @@
 //! joints stand (glTF 2.0, 3.7.2.2 and 3.7.3).
 
 use super::gltf::{AT_REST, Geometry, Place, transform};
+use super::gltf_data::Values;
 use super::gltf_document::Item;
-use glam::{Mat4, Vec3};
+use glam::Mat4;
 use std::rc::Rc;
 
 /// How a node shows its mesh.
@@ -139,7 +140,13 @@ impl<'a> Geometry<'a> {
             return Moved::As(world);
         };
         match self.blended(attributes, joints, vertices) {
-            Some(each) => Moved::Each(each),
+            Some((each, lost)) => {
+                if lost {
+                    let what = "vertices that have no weights follow the first of their joints";
+                    self.notes.tell(what, place);
+                }
+                Moved::Each(each)
+            }
             None => {
                 self.notes.tell(AT_REST, place);
                 Moved::As(world)
@@ -147,9 +154,15 @@ impl<'a> Geometry<'a> {
         }
     }
 
-    /// The weighted mean of each vertex's joints.
-    fn blended(&self, attributes: Item<'a>, joints: &[Mat4], vertices: usize) -> Option<Vec<Mat4>> {
+    /// The weighted mean of each vertex's joints, and whether some vertex has no weights: it follows its first joint.
+    fn blended(
+        &self,
+        attributes: Item<'a>,
+        joints: &[Mat4],
+        vertices: usize,
+    ) -> Option<(Vec<Mat4>, bool)> {
         let mut sums = vec![Mat4::ZERO; vertices];
+        let mut first = Vec::new();
         for set in 0.. {
             let accessor = |name: &str| attributes.index(&format!("{name}_{set}"));
             let Some(indices) = accessor("JOINTS") else {
@@ -166,21 +179,30 @@ impl<'a> Geometry<'a> {
                     *sum += *joints.get(*index as usize)? * *weight;
                 }
             }
+            if set == 0 {
+                first = indices;
+            }
         }
-        // The last element is the sum of weights, which are rounded.
-        for sum in &mut sums {
-            let total = Some(sum.w_axis.w).filter(|total| *total > 0.0)?;
-            *sum *= total.recip();
+        let mut lost = false;
+        for (vertex, sum) in sums.iter_mut().enumerate() {
+            // The last element is the sum of weights, which are rounded.
+            let total = sum.w_axis.w;
+            if total > 0.0 {
+                *sum *= total.recip();
+            } else {
+                *sum = *joints.get(first.get(vertex)?[0] as usize)?;
+                lost = true;
+            }
         }
-        Some(sums)
+        Some((sums, lost))
     }
 
-    /// Adds the weighted morph targets to the values of an attribute.
-    pub(super) fn morph(
+    /// Adds the weighted morph targets to the values of an attribute; both are read alike.
+    pub(super) fn morph<const N: usize>(
         &mut self,
         primitive: Item<'a>,
-        (name, values): (&str, &mut [[f32; 3]]),
-        pose: &Pose,
+        (name, values): (&str, &mut [[f32; N]]),
+        (pose, read): (&Pose, impl Fn(Values) -> Result<Vec<[f32; N]>, String>),
         place: Place<'_>,
     ) {
         let targets = primitive.list("targets").zip(&pose.weights);
@@ -190,10 +212,16 @@ impl<'a> Geometry<'a> {
             };
             let accessor = accessor.as_index().unwrap_or(usize::MAX);
             let moves = self.data.accessor(accessor);
-            match moves.and_then(|moves| moves.vectors::<3>()) {
+            match moves.and_then(&read) {
                 Ok(moves) => {
-                    for (value, by) in values.iter_mut().zip(moves) {
-                        *value = (Vec3::from(*value) + *weight * Vec3::from(by)).into();
+                    if moves.len() < values.len() {
+                        let what =
+                            format!("`{name}` of vertices beyond the last of a morph target stays");
+                        self.notes.tell(what, place);
+                    }
+                    let parts = moves.as_flattened().iter();
+                    for (part, by) in values.as_flattened_mut().iter_mut().zip(parts) {
+                        *part += *weight * by;
                     }
                 }
                 Err(problem) => {

@@ -33,6 +33,12 @@ impl<'a> Geometry<'a> {
             self.notes.tell(what, place);
             return Ok(());
         };
+        let used = [Some(positions), primitive.index("indices")];
+        if used.into_iter().flatten().any(|of| self.data.is_empty(of)) {
+            let what = "primitives without vertices left out";
+            self.notes.tell(what, place);
+            return Ok(());
+        }
         let local = self.data.accessor(positions);
         let local = local.and_then(|values| values.vectors::<3>());
         let mut local = local.map_err(|problem| format!("its positions {problem}"))?;
@@ -40,17 +46,18 @@ impl<'a> Geometry<'a> {
             let what = "vertices are not finite: triangles with such a corner are dropped";
             self.notes.tell(what, place);
         }
-        self.morph(primitive, ("POSITION", &mut local), pose, place);
+        let vectors = |values: Values| values.vectors::<3>();
+        self.morph(primitive, ("POSITION", &mut local), (pose, vectors), place);
         let moved = self.moved(attributes, (pose, world), local.len(), place);
         let positions: Vec<Vec3> = (local.iter().enumerate())
             .map(|(k, p)| moved.of(k).transform_point3(Vec3::from(*p)))
             .collect();
         let indices = self.read_indices(primitive, positions.len())?;
-        let colors = self.read_colors(attributes, positions.len(), place);
+        let colors = self.read_colors(primitive, pose, positions.len(), place);
         let material = self.material(primitive, !colors.is_empty(), place);
         let set = self.sets.get(material).copied().flatten();
         self.see_attributes(attributes, set, matches!(moved, Moved::Each(_)), place);
-        let uvs = self.read_uvs(attributes, set, place);
+        let uvs = self.read_uvs(primitive, pose, set, place);
         let normals = self.read_normals(primitive, pose, &moved, place);
         let counts = [colors.len(), normals.len(), uvs.len()];
         self.see_short(counts, positions.len(), place);
@@ -172,47 +179,59 @@ impl<'a> Geometry<'a> {
         }
     }
 
-    fn read_uvs(&mut self, attributes: Item<'a>, set: Option<u32>, place: Place<'_>) -> Vec<Vec2> {
+    fn read_uvs(
+        &mut self,
+        primitive: Item<'a>,
+        pose: &Pose,
+        set: Option<u32>,
+        place: Place<'_>,
+    ) -> Vec<Vec2> {
         let Some(set) = set else {
             return Vec::new();
         };
         let name = format!("TEXCOORD_{set}");
+        let attributes = primitive.get("attributes");
         if !attributes.get(&name).is_given() {
             let what =
                 "primitives lack the texture coordinates of their material: drawn as one texel";
             self.notes.tell(what, place);
         }
         let as_is = self.data.is_quantised();
-        let uvs = self.read(attributes, &name, place, |values| {
+        let pairs = |values: Values| {
             if as_is {
                 values.vectors::<2>()
             } else {
                 values.unit_vectors::<2>()
             }
-        });
+        };
+        let mut uvs = self.read(attributes, &name, place, pairs);
+        self.morph(primitive, (&name, &mut uvs), (pose, pairs), place);
         uvs.into_iter().map(Vec2::from).collect()
     }
 
     /// Linear vertex colours, which multiply the base colour; empty if none can be read.
     fn read_colors(
         &mut self,
-        attributes: Item<'a>,
+        primitive: Item<'a>,
+        pose: &Pose,
         vertices: usize,
         place: Place<'_>,
     ) -> Vec<Vec3> {
-        let colors = self.read(attributes, "COLOR_0", place, |values| {
+        let rgba = |values: Values| {
             if values.width() == 3 {
                 let colors = values.unit_vectors()?.into_iter();
                 return Ok(colors.map(|[r, g, b]| [r, g, b, 1.0]).collect());
             }
             values.unit_vectors::<4>()
-        });
+        };
+        let mut colors = self.read(primitive.get("attributes"), "COLOR_0", place, rgba);
         if colors.iter().any(|[.., alpha]| *alpha < 1.0) {
             self.notes.unread("alpha of `COLOR_0`", place);
         }
         if (colors.iter().flatten()).any(|x| !(0.0..=1.0).contains(x)) {
             self.notes.unread("`COLOR_0` beyond 0 to 1", place);
         }
+        self.morph(primitive, ("COLOR_0", &mut colors), (pose, rgba), place);
         let rgb = |[r, g, b, _]: &[f32; 4]| Vec3::new(*r, *g, *b);
         colors.iter().take(vertices).map(rgb).collect()
     }
@@ -228,7 +247,7 @@ impl<'a> Geometry<'a> {
         let attributes = primitive.get("attributes");
         let read = |values: Values| values.vectors::<3>();
         let mut normals = self.read(attributes, "NORMAL", place, read);
-        self.morph(primitive, ("NORMAL", &mut normals), pose, place);
+        self.morph(primitive, ("NORMAL", &mut normals), (pose, read), place);
         // In f64, so that a small scale does not make it singular.
         let to_world = |world: Mat4| of_normals(DMat3::from_mat4(world.as_dmat4()));
         let turned = |by: DMat3, n: [f32; 3]| {

@@ -134,9 +134,9 @@ fn image_source<'a>(
         (None, None) => (None, Encoded::Missing("it names no file".to_owned())),
     };
     ImageSource {
-        name: image
-            .text("name")
-            .or(uri)
+        // The ending of a file may be all that tells its format.
+        name: uri
+            .or(image.text("name"))
             .map_or_else(|| format!("image {index}"), str::to_owned),
         encoded,
     }

@@ -66,8 +66,8 @@ fn colors() -> Result<(), String> {
     })
 }
 
-/// Images that are reduced: half of the light of white is byte 188 by IEC 61966-2-1, half of a number 127.5, and a clear texel has no colour; a row of
-/// weight 3 counts three times.
+/// Images that are reduced: by IEC 61966-2-1 half of the light of white is byte 188 and a quarter byte 137, half of a number is
+/// 127.5, a clear texel has no colour unless nothing reads its alpha, and a row of weight 3 counts three times.
 fn smaller() -> Result<(), String> {
     let (black, white, clear) = ([0, 0, 0, 255], [255; 4], [255, 0, 0, 0]);
     let of = |texels: &[[u8; 4]], kind| reduced(texels, [2, 2], [1, 1], kind).concat();
@@ -80,12 +80,14 @@ fn smaller() -> Result<(), String> {
     let found = (
         of(&[black, white, white, black], Texels::Colours),
         of(&[white, clear, clear, white], Texels::Colours),
+        of(&[black, clear, white, black], Texels::Opaque),
         of(&[black, white, white, black], Texels::Numbers),
         rows[0].x,
     );
     let expected = (
         vec![188, 188, 188, 255],
         vec![255, 255, 255, 128],
+        vec![188, 137, 137, 255],
         vec![128, 128, 128, 255],
         2.5,
     );

@@ -3,7 +3,7 @@
 use super::builder::DEFAULT_ALBEDO;
 use super::disguise::Disguise;
 use super::gltf_files::decoded;
-use super::material::{Description, Format, emitted};
+use super::material::{Description, Format, emitted, refracts};
 use super::mtl_statements::{self, Definition, Map};
 use super::mtl_texture::{Statement, statement};
 use super::obj_statements::without_comment;
@@ -11,7 +11,8 @@ use super::tally::{Tally, Unread};
 use super::text::normalised;
 use super::texture::{Encoded, ImageSource};
 use super::{
-    AlphaChannel, AlphaMask, DIELECTRIC, DIFFUSE, LoadOptions, MIRROR, Material, TextureUse,
+    AlphaChannel, AlphaMask, DIELECTRIC, DIFFUSE, LoadOptions, MIRROR, Material, PHONG, PRINCIPLED,
+    TextureUse,
 };
 use glam::Vec3;
 use raystone_core::files::files;
@@ -228,20 +229,33 @@ impl Contents {
         };
         let found =
             Material::described(name, &description, options.kinds, file, &mut self.warnings);
+        let is_glass = found.kind == &DIELECTRIC;
+        unread.see_if(
+            refracts(source.illum) && !is_glass,
+            "`illum` of glass whose `Ni` is 1 and which filters nothing",
+            line,
+        );
+        // Their colours are `Tf` and `Ks`.
+        let is_rough = found.kind != &MIRROR && !is_glass;
+        if let Some(map) = map_kd.as_ref().filter(|_| !is_rough) {
+            unread.see("`map_Kd` of glass or a mirror", map.line);
+        }
+        let is_clamped =
+            found.kind == &PHONG && found.parameters.last() != source.shininess.as_ref();
+        unread.see_if(is_clamped, "what is beyond 0 to 100000 in `Ns`", line);
         let factor = source.opacity.unwrap_or(1.0);
         let map_d = map_d.map(|map| self.texture(folder, &map, options, unread));
-        let mask = mask(map_d, factor, found.kind != &DIELECTRIC);
+        let mask = mask(map_d, factor, !is_glass);
         self.unseen.see_if(mask.is_some() && factor <= 0.0, line);
         let mut texture = |map: Option<Map>, is_used: bool| {
             let map = map.filter(|_| is_used && options.textures)?;
             Some(self.texture(folder, &map, options, unread).place)
         };
-        let is_rough = found.kind != &MIRROR && found.kind != &DIELECTRIC;
         let emission = emitted(emission.unwrap_or([unstated_light; 3]));
         let is_lamp = emission != Vec3::ZERO;
         let textured = Material {
             base_color_texture: texture(map_kd, is_rough),
-            normal_texture: texture(norm, found.kind != &DIELECTRIC),
+            normal_texture: texture(norm, true),
             emission_texture: texture(map_ke, is_lamp),
             emission,
             mask,
@@ -249,7 +263,8 @@ impl Contents {
         };
         let shines = source.specular.is_some_and(|ks| ks != [0.0; 3]);
         // The models 0 and 1 have no highlights.
-        let is_shown = textured.kind != &DIFFUSE || matches!(source.illum, Some(0 | 1));
+        let is_shown = ![&DIFFUSE, &PRINCIPLED].contains(&textured.kind)
+            || matches!(source.illum, Some(0 | 1));
         let specular = (shines && !is_shown).then_some("a specular colour (`Ks`)");
         for what in definition.unused.into_iter().chain(specular) {
             let names = self.unused.entry(what).or_default();
@@ -332,8 +347,20 @@ fn in_order(text: &str, folders: &[&Path]) -> Statement {
             let before = &text[..text.len() - read.file.len()];
             statement(&format!("{before}-{options} {name}"))
         }
-        _ => read,
+        _ => numbered(text, &read.file, folders).unwrap_or(read),
     }
+}
+
+/// Reads a statement whose file begins with a number and a blank, which options take for one more number of theirs.
+fn numbered(text: &str, file: &str, folders: &[&Path]) -> Option<Statement> {
+    let options = &text[..text.len() - file.len()];
+    let blanks = options.rmatch_indices(char::is_whitespace);
+    let mut starts = blanks.map(|(at, blank)| at + blank.len());
+    starts.find_map(|start| {
+        let name = spelt(folders, &text[start..])?;
+        let read = statement(&format!("{}x", &text[..start]));
+        (read.file == "x").then_some(Statement { file: name, ..read })
+    })
 }
 
 /// The path of a file that is named relative to the first of `folders`, or to another; or else the

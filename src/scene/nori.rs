@@ -69,6 +69,7 @@ pub(super) fn load(
             look: Look::default(),
         };
         reader.read(root)?;
+        reader.builder.note_far();
         reader.builder.finish(name, reader.look)
     })
 }
@@ -131,7 +132,7 @@ impl Reader<'_> {
         let others = ["transform", "rfilter", "sampler"];
         let values = ["width", "height", "fov", "nearClip", "farClip"];
         self.warn_of_others(node, &others, &values);
-        let to_world = self.to_world(node)?;
+        let to_world = self.placement(node)?;
         let [width, height] = ["width", "height"].map(|name| self.number(node, name));
         let (width, height) = (width?.unwrap_or(SIZE[0]), height?.unwrap_or(SIZE[1]));
         let fov = self.number(node, "fov")?.unwrap_or(FOV);
@@ -168,11 +169,16 @@ impl Reader<'_> {
     }
 
     fn mesh(&mut self, node: Node<'_, '_>, mirror: Option<DMat4>) -> Result<(), SceneError> {
+        let is_known = |kind: &&str| ["obj", "ply"].contains(kind);
+        if let Some(kind) = node.attribute("type").filter(|kind| !is_known(kind)) {
+            self.warn(node, &format!("the mesh `{kind}` is not known, left out"));
+            return Ok(());
+        }
         let file = property(node, "filename")
             .filter(|file| !file.trim().is_empty())
             .ok_or_else(|| self.broken(node, "a mesh without `<string name=\"filename\" …>`"))?;
         let mesh = self.file(node, file)?;
-        let to_world = mirror.unwrap_or(DMat4::IDENTITY) * self.to_world(node)?;
+        let to_world = mirror.unwrap_or(DMat4::IDENTITY) * self.placement(node)?;
         self.warn_of_others(node, &["bsdf", "emitter", "transform"], &["filename"]);
         let material = self.material(node, file)?;
         let sky = mesh.daylight.as_ref().map(|sky| sky.note());
@@ -319,15 +325,20 @@ impl Reader<'_> {
         })
     }
 
-    /// A node's `toWorld` transform; its first entry applies first.
-    fn to_world(&self, node: Node<'_, '_>) -> Result<DMat4, SceneError> {
+    /// A node's `toWorld` transform, the last of them; its first entry applies first.
+    fn placement(&mut self, node: Node<'_, '_>) -> Result<DMat4, SceneError> {
         let is_it = |n: &Node<'_, '_>| {
             n.has_tag_name("transform") && n.attribute("name").is_none_or(|name| name == "toWorld")
         };
         let mut all = DMat4::IDENTITY;
-        let Some(transform) = node.children().find(is_it) else {
+        let mut given = node.children().filter(is_it);
+        let Some(transform) = given.next_back() else {
             return Ok(all);
         };
+        for earlier in given {
+            let what = "a later `<transform>` counts in place of this one";
+            self.warn(earlier, what);
+        }
         for step in transform.children().filter(Node::is_element) {
             let value = |name: &str| self.vector(step, step.attribute(name), name);
             let one = match step.tag_name().name() {

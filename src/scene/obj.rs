@@ -7,7 +7,7 @@ use super::obj_statements::{Corner, Face, Statements};
 use super::polygon::triangulate;
 use super::tally::Tally;
 use super::text::normalised;
-use super::texture::decode_all;
+use super::texture::{decode_all, forget_unused};
 use super::{LoadOptions, Material, SceneData, SceneError, mtl};
 use glam::{Vec2, Vec3};
 use std::path::Path;
@@ -46,6 +46,7 @@ pub(super) fn load(
         model.tell();
         materials.append(&mut model.without);
         let mut builder = model.builder;
+        forget_unused(&mut materials, builder.material_ids());
         let textures = decode_all(
             &textures,
             options.texture_limits(builder.len()),

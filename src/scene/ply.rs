@@ -474,7 +474,8 @@ fn corner_list(element: &Element) -> Option<usize> {
     let lists = element.properties.iter().enumerate();
     let lists = lists.filter(|(_, p)| p.length.is_some());
     let named = ["vertex_indices", "vertex_index"];
-    let mut of_name = lists.clone().filter(|(_, p)| named.contains(&&*p.name));
+    let is_named = |p: &Property| named.iter().any(|name| p.name.eq_ignore_ascii_case(name));
+    let mut of_name = lists.clone().filter(|(_, p)| is_named(p));
     let mut whole = lists.filter(|(_, p)| is_whole(p));
     let only = whole.next().filter(|_| whole.next().is_none());
     of_name.next().or(only).map(|(k, _)| k)

@@ -110,6 +110,13 @@ pub(super) struct Header {
     pub lines: usize,
 }
 
+/// The name of an element that is read, which may be written in any case.
+fn known(name: &str) -> &str {
+    let read = ["vertex", "face", "tristrips"];
+    let same = |known: &&str| known.eq_ignore_ascii_case(name);
+    read.into_iter().find(same).unwrap_or(name)
+}
+
 impl Header {
     /// Reads the header with any kind of line ends; the rest stays in the source.
     ///
@@ -168,7 +175,7 @@ impl Header {
             ["element", name, count] => {
                 let problem = || format!("`{count}` is not a number of elements");
                 self.elements.push(Element {
-                    name: name.to_owned(),
+                    name: known(name).to_owned(),
                     count: count.parse().map_err(|_| problem())?,
                     line,
                     properties: Vec::new(),

@@ -8,6 +8,8 @@ use glam::Vec4;
 pub(super) enum Texels {
     /// sRGB colours (IEC 61966-2-1) weighted by alpha.
     Colours,
+    /// sRGB colours whose alpha nothing reads.
+    Opaque,
     /// Directions 2c − 1 of length 1.
     Normals,
     Numbers,
@@ -83,12 +85,15 @@ pub(super) fn reduced(
             let means = area_means(from, to, vector, even);
             means.into_iter().map(encoded).collect()
         }
-        Texels::Colours => {
+        Texels::Colours | Texels::Opaque => {
             let linear: [f32; 256] = std::array::from_fn(|k| decoded(k as f32 / 255.0));
             let light = |at: usize| {
                 let [r, g, b, a] = texels[at];
                 let [r, g, b] = [r, g, b].map(|c| linear[usize::from(c)]);
-                let alpha = f32::from(a) / 255.0;
+                let alpha = match kind {
+                    Texels::Opaque => 1.0,
+                    _ => f32::from(a) / 255.0,
+                };
                 Vec4::new(r * alpha, g * alpha, b * alpha, alpha)
             };
             let plain = |at: usize| {
@@ -175,6 +180,10 @@ mod tests {
         let masked = checker(4, [red, NOTHING]);
         let small = reduced(&masked, [4, 4], [2, 2], Texels::Colours);
         assert_eq!(small, [[255, 0, 0, 128]; 4]);
+        // Without a mask the alpha of white and of clear black is none: half the light is byte 188 (IEC 61966-2-1).
+        let clear = checker(4, [[255, 255, 255, 10], [0, 0, 0, 255]]);
+        let small = reduced(&clear, [4, 4], [2, 2], Texels::Opaque);
+        assert_eq!(small, [[188, 188, 188, 255]; 4]);
         let gone = reduced(&[[200, 100, 0, 0]; 4], [2, 2], [1, 1], Texels::Colours);
         assert_eq!(gone, [[200, 100, 0, 0]]);
         let numbers = reduced(&checker(4, [WHITE, BLACK]), [4, 4], [1, 1], Texels::Numbers);

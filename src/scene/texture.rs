@@ -36,8 +36,20 @@ pub(super) fn texel_room(table_bytes: u64, triangles: usize) -> u64 {
     words.saturating_sub(TRIANGLE_WORDS * triangles as u64)
 }
 
-/// Decodes `sources` in parallel. Images wider or higher than `max_size` are reduced, and all of
-/// them further until they fit into `room` words. Their use decides how.
+/// Takes their textures from materials that no triangle has, since all textures share the room.
+pub(super) fn forget_unused(materials: &mut [Material], ids: &[u32]) {
+    let mut is_used = vec![false; materials.len()];
+    for id in ids {
+        is_used[*id as usize] = true;
+    }
+    let unused = materials.iter_mut().zip(is_used).filter(|(_, used)| !used);
+    for slot in unused.flat_map(|(material, _)| material.texture_uses_mut()) {
+        *slot = None;
+    }
+}
+
+/// Decodes those of `sources` that materials use, in parallel. Images wider or higher than `max_size`
+/// are reduced, and all of them further until they fit into `room` words. Their use decides how.
 ///
 /// `materials` refer to `sources` on entry and to the returned list on exit. An image that cannot
 /// be decoded is a warning, and its materials keep their constant.
@@ -47,8 +59,17 @@ pub(super) fn decode_all(
     materials: &mut [Material],
     report: &mut LoadReport,
 ) -> Vec<Texture> {
-    let read: Vec<_> = sources.par_iter().map(read).collect();
-    let sizes = read.iter().flatten().map(|(_, size)| *size);
+    let mut is_used = vec![false; sources.len()];
+    let uses = materials.iter_mut().flat_map(Material::texture_uses_mut);
+    for used in uses.flatten() {
+        is_used[used.texture as usize] = true;
+    }
+    let read: Vec<_> = sources
+        .par_iter()
+        .zip(&is_used)
+        .map(|(source, is_used)| is_used.then(|| read(source)))
+        .collect();
+    let sizes = read.iter().flatten().flatten().map(|(_, size)| *size);
     let max_size = u32::try_from(max_size.max(1)).unwrap_or(u32::MAX);
     let max_size = fitting_size(&sizes.collect::<Vec<_>>(), max_size, room);
     let kinds = kinds(sources.len(), materials);
@@ -56,13 +77,16 @@ pub(super) fn decode_all(
         .par_iter()
         .zip(read)
         .zip(kinds)
-        .map(|((source, read), kind)| decode(source, &read?.0, max_size, kind))
+        .map(|((source, read), kind)| {
+            Some(read?.and_then(|(bytes, _)| decode(source, &bytes, max_size, kind)))
+        })
         .collect();
     let mut textures = Vec::new();
     let mut new_index = Vec::new();
     for (source, result) in sources.iter().zip(decoded) {
         new_index.push(match result {
-            Ok((texture, reduced_from, is_cut)) => {
+            None => None,
+            Some(Ok((texture, reduced_from, is_cut))) => {
                 if is_cut {
                     report.warnings.push(format!(
                         "texture {}: the file ends before the image does; the rest of it is made up",
@@ -78,7 +102,7 @@ pub(super) fn decode_all(
                 textures.push(texture);
                 Some(textures.len() as u32 - 1)
             }
-            Err(problem) => {
+            Some(Err(problem)) => {
                 let is_it = |used: TextureUse| used.texture as usize == new_index.len();
                 let mut masks = materials.iter().filter_map(|m| m.mask?.texture);
                 let uncut = if masks.any(is_it) {
@@ -103,17 +127,24 @@ pub(super) fn decode_all(
     textures
 }
 
-/// Meaning of each image's texels: colours if some material shows them, else normals, else numbers.
+/// Meaning of each image's texels: colours if some material shows them, else normals, else numbers. Only masks read the
+/// alpha of colours (glTF 2.0, 3.9.4).
 fn kinds(count: usize, materials: &[Material]) -> Vec<Texels> {
     let mut kinds = vec![Texels::Numbers; count];
     for (slot, kind) in [
         (2, Texels::Normals),
-        (0, Texels::Colours),
-        (3, Texels::Colours),
+        (0, Texels::Opaque),
+        (3, Texels::Opaque),
     ] {
         let used = materials.iter().filter_map(|m| m.texture_uses()[slot]);
         for used in used {
             kinds[used.texture as usize] = kind;
+        }
+    }
+    for used in materials.iter().filter_map(|m| m.mask?.texture) {
+        let kind = &mut kinds[used.texture as usize];
+        if *kind == Texels::Opaque {
+            *kind = Texels::Colours;
         }
     }
     kinds
@@ -146,7 +177,7 @@ fn fitting_size(sizes: &[Size], max_size: u32, room: u64) -> u32 {
 fn said(error: ImageError) -> String {
     let formats = match &error {
         ImageError::Unsupported(what) if matches!(what.kind(), UnsupportedErrorKind::Format(_)) => {
-            " (PNG, JPEG, WebP, TGA, BMP, GIF, TIFF, PNM, DDS and HDR are read)"
+            " (PNG, JPEG, WebP, TGA, BMP, GIF, TIFF, PNM, HDR, and of DDS BC1 to BC3 are read)"
         }
         _ => "",
     };
@@ -214,7 +245,7 @@ fn eight_bits(image: DynamicImage, kind: Texels) -> RgbaImage {
         image,
         DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)
     );
-    if kind != Texels::Colours || !is_float {
+    if !matches!(kind, Texels::Colours | Texels::Opaque) || !is_float {
         return image.into_rgba8();
     }
     let mut light = image.into_rgba32f();
@@ -257,6 +288,7 @@ fn decode(
 
 #[cfg(test)]
 mod tests {
+    use super::super::{AlphaChannel, AlphaMask};
     use super::*;
 
     #[test]
@@ -273,6 +305,67 @@ mod tests {
         assert!(ends_early(&whole[..whole.len() - 9]));
         assert!(ends_early(&whole[..whole.len() - 1]));
         assert!(!ends_early(b"\x89PNG"));
+    }
+
+    #[test]
+    fn alpha_counts_for_colours_that_a_mask_reads_and_for_no_others() {
+        let used = |texture| Some(TextureUse::plain(texture));
+        let of = |base, mask: Option<u32>| Material {
+            base_color_texture: used(base),
+            mask: mask.map(|texture| {
+                AlphaMask::of(TextureUse::plain(texture), AlphaChannel::Alpha, None)
+            }),
+            ..Material::diffuse("", glam::Vec3::ONE)
+        };
+        let shining = Material {
+            emission_texture: used(4),
+            ..of(0, None)
+        };
+        let materials = [
+            of(0, None),
+            of(1, Some(1)),
+            of(2, Some(3)),
+            of(1, None),
+            shining,
+        ];
+        let [a, b, numbers] = [Texels::Opaque, Texels::Colours, Texels::Numbers];
+        assert_eq!(kinds(6, &materials), [a, b, a, numbers, a, numbers]);
+    }
+
+    #[test]
+    fn textures_of_materials_that_no_triangle_has_are_not_read() {
+        let materials = || {
+            [0, 1].map(|texture| Material {
+                base_color_texture: Some(TextureUse::plain(texture)),
+                mask: Some(AlphaMask::of(
+                    TextureUse::plain(texture),
+                    AlphaChannel::Alpha,
+                    None,
+                )),
+                ..Material::diffuse("", glam::Vec3::ONE)
+            })
+        };
+        let source = |name: &str, red: u8| ImageSource {
+            name: name.to_owned(),
+            encoded: Encoded::Memory([&b"P6 2 1 255\n"[..], &[red; 6]].concat().into()),
+        };
+        for (ids, expected) in [(&[0, 1][..], &["a", "b"][..]), (&[1], &["b"]), (&[], &[])] {
+            let (mut all, mut report) = (materials(), LoadReport::default());
+            forget_unused(&mut all, ids);
+            let sources = [source("a", 1), source("b", 2)];
+            // Two textures have room for one texel each, one of them for both of its own.
+            let textures = decode_all(&sources, [64, 3], &mut all, &mut report);
+            let names: Vec<_> = textures.iter().map(|t| &*t.name).collect();
+            assert_eq!(names, expected);
+            let widths = textures.iter().all(|t| t.width == 3 - ids.len() as u32);
+            assert!(widths, "{ids:?}: {textures:?}");
+            assert_eq!(report.warnings.len(), if ids.len() == 2 { 2 } else { 0 });
+            let of_b = all[1].mask.and_then(|mask| mask.texture);
+            assert_eq!(
+                of_b.map(|b| b.texture),
+                ids.len().checked_sub(1).map(|k| k as u32)
+            );
+        }
     }
 
     #[test]

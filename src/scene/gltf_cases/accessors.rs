@@ -143,7 +143,6 @@ fn a_value_that_is_used_and_wrong_is_named() {
             json!(7),
             &["indices are outside", "buffer view 1"],
         ),
-        ("/accessors/0/count", json!(0), &["positions are empty"]),
         (
             "/accessors/0/type",
             json!("VEC2"),
@@ -313,6 +312,19 @@ fn what_is_no_face_is_left_out() {
         .primitive(line)
         .load();
     two.but(2, &["(2, the first: mesh 0 `square`, primitive 1)"]);
+    for (of, component, kind, [positions, indices]) in
+        [(0, 5126, "VEC3", [2, 1]), (1, 5125, "SCALAR", [0, 2])]
+    {
+        let alone = case("nothing").set(&format!("/accessors/{of}/count"), json!(0));
+        let told = ["no triangles", "without vertices left out", "primitive 0"];
+        alone.load().fails(&told);
+        let empty = json!({"componentType": component, "count": 0, "type": kind});
+        case("an empty part")
+            .set("/accessors/-", empty)
+            .primitive(json!({"attributes": {"POSITION": positions}, "indices": indices}))
+            .load()
+            .but(2, &["without vertices left out", "primitive 1"]);
+    }
     case("no positions")
         .primitive(json!({"attributes": {"NORMAL": 0}}))
         .load()

@@ -62,6 +62,61 @@ fn textures_are_drawn_or_their_constant_is() {
         )
         .images(0)
         .color(PLAIN);
+    let smooth = textured("a smooth metal")
+        .set("/materials/0/pbrMetallicRoughness/metallicFactor", json!(1))
+        .set(
+            "/materials/0/pbrMetallicRoughness/roughnessFactor",
+            json!(0),
+        )
+        .load()
+        .whole(2)
+        .images(1);
+    let [mirror, ..] = &smooth.scene().materials[..] else {
+        panic!("no material");
+    };
+    assert_eq!(mirror.kind, &crate::MIRROR);
+    assert!(mirror.base_color_texture.is_some(), "{mirror:?}");
+    let bent = textured("bent glass")
+        .set(
+            "/materials/0",
+            json!({"pbrMetallicRoughness": {"metallicFactor": 0}, "normalTexture": {"index": 0},
+            "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}),
+        )
+        .set(
+            "/materials/0/pbrMetallicRoughness/roughnessFactor",
+            json!(0),
+        )
+        .load()
+        .whole(2)
+        .images(1);
+    let glass = &bent.scene().materials[0];
+    assert_eq!(glass.kind, &crate::DIELECTRIC);
+    assert!(glass.normal_texture.is_some(), "{glass:?}");
+    textured("a file whose name alone tells its format")
+        .set("/images/0", json!({"uri": "wood.tga", "name": "wood"}))
+        .file("wood.tga", image(image::ImageFormat::Tga))
+        .load()
+        .whole(2)
+        .images(1);
+    for code in [33_069, 10_496] {
+        textured("an unknown way to wrap")
+            .set("/textures/0/sampler", json!(0))
+            .set("/samplers", json!([{"wrapS": 33_071, "wrapT": code}]))
+            .load()
+            .but(2, &["wrap in an unknown way", "sampler 0"])
+            .images(1);
+    }
+    textured("known ways to wrap")
+        .set("/textures/0/sampler", json!(0))
+        .set("/samplers", json!([{"wrapS": 33_648, "wrapT": 10_497}]))
+        .load()
+        .whole(2);
+    let unused = json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 7}}});
+    textured("a texture that is not there of a material that no face has")
+        .set("/materials/-", unused)
+        .load()
+        .whole(2)
+        .images(1);
     textured("an image for browsers alone")
         .set(
             "/textures",
@@ -276,6 +331,36 @@ fn surfaces_that_are_drawn_otherwise_are_named() {
         .load()
         .whole(2)
         .color([0.1, 0.2, 0.3].map(|x| x / 0.96));
+    // The roughness is 1 − gloss; that of the fallback's texture means nothing here.
+    let glossy = textured("gloss besides a fallback")
+        .set(
+            "/materials/0/pbrMetallicRoughness/metallicRoughnessTexture",
+            json!({"index": 0}),
+        )
+        .set(
+            "/materials/0/extensions",
+            json!({"KHR_materials_pbrSpecularGlossiness":
+            {"specularFactor": [0, 0, 0], "glossinessFactor": 0.25}}),
+        )
+        .load()
+        .whole(2)
+        .images(0);
+    let clear = textured("glass besides a fallback")
+        .set(
+            "/materials/0/pbrMetallicRoughness/metallicRoughnessTexture",
+            json!({"index": 0}),
+        )
+        .set(
+            "/materials/0/extensions",
+            json!({"KHR_materials_transmission": {"transmissionFactor": 1},
+            "KHR_materials_pbrSpecularGlossiness": {}}),
+        )
+        .load()
+        .whole(2);
+    assert_eq!(clear.scene().materials[0].kind, &crate::DIELECTRIC);
+    let material = &glossy.scene().materials[0];
+    assert_eq!(material.metallic_roughness_texture, None);
+    assert_eq!(material.parameters[1], 0.75);
     case("a short colour")
         .material(json!({"pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3], "metallicFactor": 0}}))
         .load()

@@ -2,7 +2,8 @@
 //!
 //! * MTL: illumination models 4, 6, 7 and 9 refract. The index is `Ni` (default 1.5); the body
 //!   filters light by `Tf`, by its square root at each of two surfaces. A missing or black `Tf`
-//!   filters nothing: exporters write 0 for "not stated". `d` below 1 with another model is partial
+//!   filters nothing: exporters write 0 for "not stated". An index of 1 without a filter would be
+//!   nothing to see, and is no glass. `d` below 1 with another model is partial
 //!   coverage, which no kind renders yet.
 //! * glTF: `KHR_materials_transmission` of at least a half on non-metals, with the base colour as
 //!   tint and `KHR_materials_ior` (default 1.5). Walls are thin, as in the standard, unless
@@ -49,11 +50,10 @@ fn recognise(description: &Description<'_>) -> Option<Look> {
             let stated = filter.is_finite() && filter.max_element() > 0.0;
             let filter = if stated { filter } else { Vec3::ONE };
             let tint = filter.clamp(Vec3::ZERO, Vec3::ONE).map(f32::sqrt);
-            (
-                source.illum.is_some_and(|i| ILLUM.contains(&i)),
-                tint,
-                false,
-            )
+            // Maya writes so for surfaces of every kind.
+            let is_nothing =
+                tint == Vec3::ONE && source.ior.is_some_and(|ior| (ior - 1.0).abs() < 1e-3);
+            (refracts(source.illum) && !is_nothing, tint, false)
         }
         Format::Gltf => {
             let transmits = source.transmission.is_some_and(|t| t >= LEAST_TRANSMISSION);
@@ -64,6 +64,11 @@ fn recognise(description: &Description<'_>) -> Option<Look> {
         }
     };
     is_glass.then(|| look(tint, source.ior, is_thin))
+}
+
+/// Whether this MTL illumination model is one of glass.
+pub(in super::super) fn refracts(illum: Option<u8>) -> bool {
+    illum.is_some_and(|illum| ILLUM.contains(&illum))
 }
 
 fn look(tint: Vec3, ior: Option<f32>, is_thin: bool) -> Look {
@@ -136,6 +141,13 @@ mod tests {
             Some((half, vec![1.33, 0.0]))
         );
         assert_eq!(mtl(4, None, None), clear(DEFAULT_IOR));
+        assert_eq!(mtl(4, Some(1.0), Some([1.0; 3])), None, "Maya's default");
+        assert_eq!(mtl(4, Some(1.0), None), None);
+        assert_eq!(
+            mtl(4, Some(1.0), Some([0.25; 3])),
+            Some((half, vec![1.0, 0.0])),
+            "a filter"
+        );
         assert_eq!(mtl(6, Some(0.0), Some([0.0; 3])), clear(DEFAULT_IOR));
         assert_eq!(
             mtl(9, Some(f32::INFINITY), Some([f32::NAN; 3])),

@@ -11,6 +11,7 @@ mod phong;
 mod principled;
 
 pub use cook_torrance::{COOK_TORRANCE, CookTorrance, Fresnel, Masking};
+pub(super) use dielectric::refracts;
 pub use dielectric::{DEFAULT_IOR, DIELECTRIC};
 pub use diffuse::DIFFUSE;
 pub use mirror::MIRROR;

@@ -38,6 +38,24 @@ const NORI: &[(&str, &str, Outcome)] = &[
         ),
     ),
     (
+        "<transform name=\"toWorld\"><translate value=\"0,4649776,0\"/></transform>",
+        "",
+        Reads(".", &["rounded to steps of 0.5, and the model is 1"]),
+    ),
+    (
+        "<transform name=\"toWorld\"><translate value=\"0,4649776,0\"/></transform><transform name=\"toWorld\"/>",
+        "",
+        Reads(
+            ".",
+            &["line 4: a later `<transform>` counts in place of this one"],
+        ),
+    ),
+    (
+        "</mesh><mesh type=\"sphere\"><float name=\"radius\" value=\"1\"/>",
+        "",
+        Reads(".", &["line 4: the mesh `sphere` is not known, left out"]),
+    ),
+    (
         "<medium type=\"homogeneous\"/>",
         "",
         Reads(".", &["`<medium>` of `<mesh>` is not read"]),

@@ -1,6 +1,7 @@
 //! OBJ and MTL.
 
 use super::{Fails, Outcome, Reads, check, load_files};
+use glam::{Mat2, Vec2};
 
 const RED_AND_BLUE: &str = "newmtl red\nKd 0.8 0.1 0.1\nnewmtl blue\nKd 0.1 0.1 0.8\n";
 
@@ -371,6 +372,36 @@ const MTL: &[(&str, Outcome)] = &[
     ),
     ("newmtl a\nKd 1 0 0\nPr 0.5\nPm 0", Reads("r", &[])),
     (
+        "newmtl a\nKd 1 0 0\nillum 4\nTf 1 1 1\nNi 1.00",
+        Reads(
+            "r",
+            &["`illum` of glass whose `Ni` is 1 and which filters nothing (line 1)"],
+        ),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nnewmtl b\nmap_Ke none.png",
+        Reads("r", &[]),
+    ),
+    (
+        "newmtl a\nillum 4\nnorm t.png\nmap_Kd t.png",
+        Reads(".", &["`map_Kd` of glass or a mirror (line 4)"]),
+    ),
+    (
+        "newmtl a\nKd 0.5 0 0\nKs 0.2 0.2 0.2\nillum 2\nPm 0",
+        Reads(
+            "r",
+            &["1 material is shaped by a specular colour (`Ks`), which is not rendered yet"],
+        ),
+    ),
+    (
+        "newmtl a\nKd 0.5 0 0\nKs 0.2 0.2 0.2\nNs 1e7\nillum 2",
+        Reads("r", &["what is beyond 0 to 100000 in `Ns` (line 1)"]),
+    ),
+    (
+        "newmtl a\nKd 0.5 0 0\nKs 0.2 0.2 0.2\nNs 1e5\nillum 2",
+        Reads("r", &[]),
+    ),
+    (
         "newmtl a # wall\nKd 1 0 0\nnewmtl a #2\nKd 0 1 0",
         Reads("r", &[]),
     ),
@@ -398,6 +429,25 @@ fn mtl_files_as_found_are_read() {
             assert_eq!(scene.textures.len(), count, "{library}");
         }
         check(library, result, expected);
+    }
+}
+
+/// Options take up to three numbers, and the file's name begins with one.
+#[test]
+fn a_texture_may_begin_with_a_number() {
+    let model = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
+    for options in ["-s 4 2", "-bm 1 -s 4 2", "-s 4 2 1 -o 0"] {
+        let library = format!("newmtl a\nmap_Kd {options} 01 old bricks.ppm\n");
+        let files: [(&str, &[u8]); 3] = [
+            ("a.obj", model),
+            ("m.mtl", library.as_bytes()),
+            ("01 old bricks.ppm", b"P6 1 1 255\n\x01\x02\x03"),
+        ];
+        let scene = load_files(&files).expect(options);
+        assert_eq!(scene.textures.len(), 1, "{options}: {:?}", scene.report);
+        let used = scene.materials[0].base_color_texture.expect("a texture");
+        assert_eq!(used.linear, Mat2::from_diagonal(Vec2::new(4.0, 2.0)));
+        assert_eq!(used.offset, Vec2::new(0.0, -1.0), "{options}");
     }
 }
 

@@ -10,6 +10,10 @@ const CORNERS: &str = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
 const PLY: &[(&str, Outcome)] = &[
     ("V4F1E C4 0 1 2 3\n", Reads("..", &[])),
     (
+        "element verteX 4\nproperty float x\nproperty float y\nproperty float z\nelement fAce 1\nproperty list uchar int vertex_Indices\nproperty list uchar int other\nE C4 0 1 2 3 1 7\n",
+        Reads("..", &["`other` of `face` (line 9)"]),
+    ),
+    (
         "V5F1E C nan nan nan\n4 0 1 2 3\n",
         Reads("..", &["1 vertex is not finite (vertex 4)"]),
     ),

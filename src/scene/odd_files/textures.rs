@@ -1,8 +1,8 @@
 //! Textures in the formats that models of others have. The bytes are Pillow's 12 and tifffile's, or written by hand.
 
 use super::{SceneData, load_files};
-use crate::LoadReport;
 use crate::texture::{Encoded, ImageSource, decode_all};
+use crate::{LoadReport, Material, TextureUse};
 
 /// Red and green above blue and white. The ending says what a file is only where its bytes do not.
 const FOUR: [(&str, &str); 11] = [
@@ -172,6 +172,24 @@ fn what_is_no_image_is_named_with_the_formats_that_are() {
 }
 
 #[test]
+fn a_dds_of_another_kind_is_named_with_those_that_are_read() {
+    let mut dds = [&b"DDS "[..], &[0; 124]].concat();
+    for (at, word) in [
+        (4, 124),
+        (8, 0x1007),
+        (12, 4),
+        (16, 4),
+        (76, 32),
+        (80, 0x40),
+    ] {
+        dds[at..at + 4].copy_from_slice(&u32::to_le_bytes(word));
+    }
+    let lines = with_texture("t.dds", &dds).report.lines().join("\n");
+    assert!(lines.contains("of DDS BC1 to BC3 are read"), "{lines}");
+    assert!(!lines.contains("PNM, DDS"), "{lines}");
+}
+
+#[test]
 fn damaged_textures_are_read_or_refused_and_never_panic() {
     let damage = |bytes: &[u8], k: usize| {
         let mut bytes = bytes.to_vec();
@@ -193,7 +211,11 @@ fn damaged_textures_are_read_or_refused_and_never_panic() {
                 encoded: Encoded::Memory(damage(&whole, k).into()),
             }];
             let mut report = LoadReport::default();
-            let textures = decode_all(&sources, [64, 1 << 20], &mut [], &mut report);
+            let mut materials = [Material {
+                base_color_texture: Some(TextureUse::plain(0)),
+                ..Material::diffuse("", glam::Vec3::ONE)
+            }];
+            let textures = decode_all(&sources, [64, 1 << 20], &mut materials, &mut report);
             let [width, height] = textures.first().map_or([0; 2], |t| [t.width, t.height]);
             assert!(width <= 64 && height <= 64, "{name}, {k}");
             assert!(
