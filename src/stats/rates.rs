@@ -11,7 +11,7 @@ pub fn without_overhead(samples: &[f64], empty: f64) -> Vec<f64> {
         .collect()
 }
 
-/// True if most rounds take no longer than an empty one does, within a hundredth: there is no rate to tell.
+/// True if most rounds take no longer than an empty one does, within a hundredth: it cannot be taken off them.
 pub fn is_hidden(samples: &[f64], empty: f64) -> bool {
     let hidden = samples.iter().filter(|ms| **ms - empty <= 0.01 * **ms);
     2 * hidden.count() > samples.len()
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn rounds_no_longer_than_an_empty_one_have_no_rate() {
+    fn an_empty_round_cannot_be_taken_off_rounds_that_are_no_longer() {
         for (samples, empty, hidden) in [
             (&[0.40, 0.42, 0.45, 0.37, 4.9][..], 0.45, true),
             (&[0.40, 4.2, 4.5, 0.37, 4.9], 0.45, false),

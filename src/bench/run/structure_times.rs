@@ -133,18 +133,11 @@ pub(super) fn time_all(
             write_failed(session, world, &one.cell, one.record)?;
         } else {
             let rates = one.record.body.timings.iter().map(|t| t.mrays_s.value);
-            // A class without a speed counts for nothing.
-            one.speed = mean_of_logs(rates);
+            one.speed = rates.map(f64::ln).sum();
             kept.push(one);
         }
     }
     Ok(kept)
-}
-
-/// The mean of the logarithms, by which structures are ranked that may have been timed by other classes; 0 of none.
-fn mean_of_logs(rates: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let count = rates.len().max(1) as f64;
-    rates.map(f64::ln).sum::<f64>() / count
 }
 
 /// Rays of a class, ready to be traced through a structure.
@@ -224,7 +217,7 @@ fn sees_a_wrong_answer(world: &World, one: &Gated, item: &Timed) -> bool {
     found.is_err() || found.is_ok_and(|fault| fault.is_some())
 }
 
-/// The figures of a class, if its answers are right; none where the time is below what can be measured.
+/// The figures of a class, if its answers are right: without what a dispatch of nothing takes, unless they take no longer.
 fn class_timing(
     session: &mut Session,
     world: &World,
@@ -255,7 +248,7 @@ fn class_timing(
     if let Some(slow) = slow_slice(item.rays.batch.longest_slice_ms()) {
         session.tell_warning(&format!("{}, {:?} rays: {slow}", one.cell, set.class));
     }
-    let empties = session
+    let mut empties = session
         .clock
         .time("gpu", || empty_rounds(|| item.rays.batch.trace_nothing()))
         .map_err(text)?;
@@ -266,13 +259,13 @@ fn class_timing(
             count_work(gpu, triangles, &one.traced, set.query(), &set.rays)
         })
         .map_err(text)?;
-    let empty = median(&empties).unwrap_or(0.0);
+    let mut empty = median(&empties).unwrap_or(0.0);
     if is_hidden(&samples.ms, empty) {
         session.tell_warning(&format!(
-            "{}, {:?} rays: no speed, since a dispatch of nothing takes as long ({empty:.3} ms): raise timing.rays",
+            "{}, {:?} rays: a dispatch of nothing takes as long ({empty:.3} ms), and is in their time: they are at least as fast as shown; raise timing.rays",
             one.cell, set.class
         ));
-        return Ok(None);
+        (empties, empty) = (Vec::new(), 0.0);
     }
     let ms = without_overhead(&samples.ms, empty);
     let rays = set.rays.len() as f64;
