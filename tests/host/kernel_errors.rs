@@ -214,6 +214,8 @@ fn an_unknown_word_is_found_on_every_line_that_assigns() {
     ];
     let files = support::in_turn("kernels with an unknown word", files);
     let least = 4 * files.len();
+    // Of all files together a tenth of the lines is left out; one third of them has a fifth.
+    let share = if support::is_full() { 10 } else { 3 };
     for (file, structure) in files {
         let text = embedded(file);
         for (index, line) in text.lines().enumerate() {
@@ -237,7 +239,7 @@ fn an_unknown_word_is_found_on_every_line_that_assigns() {
         }
     }
     assert!(
-        checked > least && 10 * left_out < checked,
+        checked > least && share * left_out < checked,
         "{checked} lines were broken, {left_out} are left out"
     );
 }
