@@ -4,13 +4,14 @@ use super::arguments::{DeviceArguments, ValueArguments, listed, on_axis, plan, w
 use super::faults::plant_faults;
 use super::output::OutputArguments;
 use super::run::carry_out;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
 use raystone::config::expect::Thesis;
 use raystone::config::{Axis, Experiment, STRESS};
 use raystone::run::Existing;
 use raystone::scene::named;
-use raystone::stress::EXPERIMENT;
+use raystone::stress::{EXPERIMENT, family_names};
+use raystone::text::did_you_mean_or_known;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -29,7 +30,7 @@ pub struct Stress {
     /// Structures, such as `bvh,cwbvh`; may be given many times; brute force always takes part [default: all]
     #[arg(long)]
     accel: Vec<String>,
-    /// Family; may be given many times [default: all, and the shots]
+    /// Families, such as `edges,shots`; may be given many times [default: all]
     #[arg(long)]
     family: Vec<String>,
     /// Rays per case [default: 512, quick 128]
@@ -60,6 +61,24 @@ pub struct Stress {
 const BRUTE_FORCE: &str = "brute-force";
 /// The experiment's name in messages.
 const FILE: &str = "experiments/stress.toml";
+
+/// Returns the families of a flag.
+///
+/// # Errors
+/// A name that no family has.
+fn families(named: &[String]) -> Result<Vec<String>> {
+    let known: Vec<&str> = family_names().collect();
+    let checked = listed(named).map(|name| {
+        if !known.contains(&name) {
+            bail!(
+                "--family: unknown family `{name}`{}",
+                did_you_mean_or_known(name, &known)
+            );
+        }
+        Ok(name.to_owned())
+    });
+    checked.collect()
+}
 
 impl Stress {
     pub fn execute(self) -> Result<ExitCode> {
@@ -111,7 +130,7 @@ impl Stress {
                 .shots
                 .filter(|shots| *shots > 0)
                 .map(|_| "shots".to_owned());
-            let parts = self.family.iter().cloned().chain(shots);
+            let parts = families(&self.family)?.into_iter().chain(shots);
             let parts = parts.map(|part| format!("{STRESS}{part}"));
             overrides.extend(on_axis(Axis::Integrator, parts));
         }

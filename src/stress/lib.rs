@@ -21,6 +21,7 @@ pub mod shots;
 pub(crate) mod suite;
 pub mod tally;
 
+pub use families::family_names;
 pub use found::Found;
 pub use measurement::{Settings, register};
 

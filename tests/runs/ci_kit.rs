@@ -119,6 +119,19 @@ fn exit_codes_say_what_fails() {
 }
 
 #[test]
+fn a_file_of_records_is_a_baseline_too() {
+    let kit = Kit::new(0, 1, "");
+    fs::write(kit.path("base"), "records").expect("written");
+    let output = kit.execute("");
+    assert_eq!(
+        output.status.code(),
+        Some(1),
+        "the comparison found it worse"
+    );
+    assert!(!kit.read("summary").contains("no baseline yet"));
+}
+
+#[test]
 fn a_first_run_becomes_the_baseline() {
     for run in [0, 1] {
         let kit = Kit::new(run, 9, "");

@@ -72,6 +72,12 @@ families! {
     "instances" => placed::instances,
 }
 
+/// Returns the names that `--family` takes: every family, and the shots at closed meshes.
+pub fn family_names() -> impl Iterator<Item = &'static str> {
+    let families = FAMILIES.iter().map(|family| family.name);
+    families.chain([super::shot_meshes::FAMILY])
+}
+
 impl Family {
     /// Returns the family of this name.
     pub(crate) fn named(name: &str) -> Option<&'static Self> {

@@ -134,6 +134,28 @@ fn bad_usage_ends_with_2() {
 }
 
 #[test]
+fn an_unknown_family_of_the_stress_suite_is_named_by_its_flag() {
+    let message = error(&run(&["stress", "--quick", "--family", "edges,nedles"]), 2);
+    assert!(
+        message.contains("--family: unknown family `nedles`"),
+        "{message}"
+    );
+    assert!(!message.contains("--set"), "{message}");
+}
+
+#[test]
+fn pages_of_a_folder_without_tables_end_with_2_and_leave_it_empty() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let message = error(&run(&["repro", "--pages", "--out", text(folder.path())]), 2);
+    assert!(
+        message.contains("holds no whole records of a table"),
+        "{message}"
+    );
+    let left = std::fs::read_dir(folder.path()).expect("a folder").count();
+    assert_eq!(left, 0, "a page of nothing was written");
+}
+
+#[test]
 fn a_scene_is_exported_by_its_old_name_too_and_flags_of_something_else_are_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let out = text(folder.path());
