@@ -200,6 +200,25 @@ mod tests {
     }
 
     #[test]
+    fn what_is_built_costs_least_by_the_table() {
+        let soup = lattice(2);
+        let (table, _) = AdviceTable::built_in("").unwrap();
+        for rays in [1.0, 1e5, 1e9] {
+            let mut params = Params::default();
+            params.0.insert("rays".to_owned(), ParamValue::Number(rays));
+            let mut log = BuildLog::default();
+            crate::AccelKind::build(&Auto, &soup, &params, &mut log).unwrap();
+            let label = &chosen(&log)[0];
+            let totals = table.predict(&features(&soup)).into_iter().map(|p| {
+                let ns_per_ray = p.ns.values().sum::<f64>() / p.ns.len() as f64;
+                (p.choice.label(), p.build_ms + rays * ns_per_ray * 1e-6)
+            });
+            let least = totals.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+            assert_eq!(*label, least.0, "{rays}: {least:?}");
+        }
+    }
+
+    #[test]
     fn many_rays_do_not_build_faster_than_few() {
         let features = features(&lattice(2));
         let (table, _) = AdviceTable::built_in("").unwrap();

@@ -8,7 +8,7 @@ use std::fmt;
 pub const NO_HIT: u32 = u32::MAX;
 
 /// The smallest component of a raised direction, 2⁻⁸⁴, so that the reciprocal is finite: WGSL does
-/// not guarantee infinities. With coordinates up to 1e12 (checked on scene load), and twice that
+/// not guarantee infinities. With coordinates up to 1e9 (checked on scene load), and twice that
 /// for a cell around them, `(bounds - origin) / SMALLEST_COMPONENT` stays below the largest f32.
 pub(crate) const SMALLEST_COMPONENT: f32 = 5.169_879e-26;
 

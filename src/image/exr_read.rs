@@ -28,7 +28,8 @@ pub(super) fn read_exr(bytes: &[u8]) -> Result<Image, String> {
     let layers = &found.layer_data;
     let candidates: Vec<Colours> = layers
         .iter()
-        .flat_map(|layer| colours(layer, layers.len() > 1))
+        .enumerate()
+        .flat_map(|(place, layer)| colours(layer, (layers.len() > 1).then_some(place)))
         .collect();
     let colours = chosen(&candidates).ok_or_else(|| no_picture(&candidates, layers))?;
     let window = found.attributes.display_window;
@@ -57,6 +58,8 @@ type FlatLayer = Layer<AnyChannels<FlatSamples>>;
 struct Colours<'a> {
     /// Layer name, empty if it has none.
     name: String,
+    /// Whether these are the channels without a layer of the first of several parts.
+    is_first_part: bool,
     layer: &'a FlatLayer,
     samples: [&'a FlatSamples; 3],
 }
@@ -65,14 +68,14 @@ fn split(name: &str) -> (&str, &str) {
     name.rsplit_once('.').unwrap_or(("", name))
 }
 
-/// The images in a part of a file. If there are several parts, part names count as well.
-fn colours(layer: &FlatLayer, several: bool) -> Vec<Colours<'_>> {
+/// The images in a part of a file. If it is the part of this index among several, part names count as well.
+fn colours(layer: &FlatLayer, place: Option<usize>) -> Vec<Colours<'_>> {
     let list = &layer.channel_data.list;
     let names: Vec<String> = list.iter().map(|c| c.name.to_string()).collect();
     let mut prefixes: Vec<&str> = names.iter().map(|name| split(name).0).collect();
     prefixes.dedup();
     let part = layer.attributes.layer_name.as_ref();
-    let part = part.filter(|_| several).map(ToString::to_string);
+    let part = part.filter(|_| place.is_some()).map(ToString::to_string);
     let of_prefix = |prefix: &str| {
         let channel = |wanted: &str| {
             let is_it = |name: &String| {
@@ -91,6 +94,7 @@ fn colours(layer: &FlatLayer, several: bool) -> Vec<Colours<'_>> {
         let name: Vec<&str> = name.into_iter().filter(|n| !n.is_empty()).collect();
         Some(Colours {
             name: name.join("."),
+            is_first_part: place == Some(0) && prefix.is_empty(),
             layer,
             samples,
         })
@@ -104,7 +108,13 @@ fn chosen<'a, 'b>(candidates: &'b [Colours<'a>]) -> Option<&'b Colours<'a>> {
         candidates.iter().find(is_it)
     };
     let known = PICTURE_LAYERS.iter().find_map(called);
-    known.or_else(|| candidates.first().filter(|_| candidates.len() == 1))
+    // Programs that know of one part only read the first.
+    let first = || {
+        candidates
+            .first()
+            .filter(|c| candidates.len() == 1 || c.is_first_part)
+    };
+    known.or_else(first)
 }
 
 fn no_picture(candidates: &[Colours], layers: &[FlatLayer]) -> String {
@@ -221,6 +231,15 @@ mod tests {
         let depth = part(Some("depth"), &[("Z", 1.0)]);
         let parts = vec![depth, part(Some("rgba"), &RGB)];
         assert_eq!(of_parts(parts).unwrap().pixels[1], plain, "parts");
+        // As readers of one part have it: the colours of the first.
+        let darker = RGB.map(|(c, v)| (c, 0.5 * v));
+        for names in [["C", "N"], ["rgba.left", "rgba.right"], ["left", "right"]] {
+            let parts = vec![part(Some(names[0]), &RGB), part(Some(names[1]), &darker)];
+            assert_eq!(of_parts(parts).unwrap().pixels[1], plain, "{names:?}");
+        }
+        let depth = part(Some("depth"), &[("Z", 1.0)]);
+        let parts = vec![depth, part(Some("C"), &RGB), part(Some("N"), &darker)];
+        assert!(of_parts(parts).unwrap_err().contains("C, N"));
     }
 
     #[test]

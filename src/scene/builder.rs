@@ -8,10 +8,10 @@ use super::{
 use glam::{Vec2, Vec3};
 use raystone_core::geometry::{Camera, Triangle};
 
-/// Largest absolute coordinate. Triangle tests multiply three coordinate differences, and WGSL
-/// leaves overflow undefined: 8 · (2 · 1e12)³ stays below the largest f32. So do distances times
-/// 1e20, the largest reciprocal of a direction component in the kernels.
-pub const MAX_COORDINATE: f32 = 1e12;
+/// Largest absolute coordinate. Triangle tests multiply up to four coordinate differences, shading squares cross products
+/// of edges to find normals and areas, and WGSL leaves overflow undefined: 12 · (2 · 1e9)⁴ stays below the largest f32. So do
+/// distances times 1e20, the largest reciprocal of a direction component in the kernels.
+pub const MAX_COORDINATE: f32 = 1e9;
 
 /// Reflectance of surfaces whose file gives none.
 pub const DEFAULT_ALBEDO: f32 = 0.7;
@@ -35,6 +35,20 @@ impl Look {
             camera: Some(Camera::upright(eye, target, fov)),
             environment: Vec3::ONE,
             ..Self::default()
+        }
+    }
+
+    /// Takes the emission from materials whose emissive texture is black: a texture multiplies, and light that no texel
+    /// gives must not keep the default sky away.
+    fn darken(&mut self) {
+        for material in &mut self.materials {
+            let texture = material.emission_texture.as_ref();
+            let texture = texture.and_then(|used| self.textures.get(used.texture as usize));
+            let is_black = |texel: &[u8; 4]| texel[..3] == [0; 3];
+            if texture.is_some_and(|texture| texture.texels.iter().all(is_black)) {
+                material.emission = Vec3::ZERO;
+                material.emission_texture = None;
+            }
         }
     }
 }
@@ -260,6 +274,7 @@ impl SceneBuilder {
             crate::check_camera(camera)?;
         }
         mask::settle(&mut look.materials, &look.textures);
+        look.darken();
         let textured = !look.textures.is_empty();
         let assembly = self.take_assembly();
         if !self.mirrored.is_empty() {

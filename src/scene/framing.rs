@@ -144,7 +144,7 @@ impl Framing {
 fn sphere_around(bounds: &Bounds) -> (Vec3, f32) {
     let center = bounds.center();
     let least = 1e-3 * center.abs().max_element();
-    (center, bounds.radius().max(least).max(1e-6))
+    (center, bounds.radius().max(least).max(1e-30))
 }
 
 fn to_unit(v: Vec3, center: Vec3, radius: f32) -> Vec3 {

@@ -52,7 +52,8 @@ impl Files {
 
     /// Resolves a relative URI: as the standard has it, with `%20` and the like decoded, or as
     /// exporters write it, with backslashes, a blank or percent sign as it is, or a query behind; or else the only file
-    /// whose name differs in case alone, with a note.
+    /// whose name differs in case or in how Unicode composes its letters alone, or a file of this name beside the model,
+    /// with a note.
     ///
     /// # Errors
     /// The file lies outside the model's folder, by name or by link, and that is not allowed.
@@ -71,7 +72,15 @@ impl Files {
         let exists = |file: &&PathBuf| raystone_core::files::files().real(file).is_ok();
         let as_written = files.iter().find(exists).cloned();
         let in_any_case = || written.iter().find_map(|name| found(&self.folder, name));
-        let other = as_written.is_none().then(in_any_case).flatten();
+        // The path of another machine.
+        let beside = || {
+            let mut names = written
+                .iter()
+                .filter_map(|name| name.rsplit(['/', '\\']).next());
+            names.find_map(|name| found(&self.folder, name))
+        };
+        let other = || in_any_case().or_else(beside);
+        let other = as_written.is_none().then(other).flatten();
         let note = other.as_ref().map(|other| {
             let other = other.display();
             format!("`{uri}` is not there: {other} is read")
@@ -79,9 +88,11 @@ impl Files {
         // None exists: the name that is most likely meant, for the message.
         let file = as_written.or(other).unwrap_or_else(|| files[2].clone());
         if !self.allow_outside && !self.is_inside(&file) {
-            return Err(format!(
-                "`{uri}` lies outside the model's folder; --allow-outside reads it all the same"
-            ));
+            let advice = match raystone_core::files::files().real(&file) {
+                Ok(_) => "--allow-outside reads it all the same",
+                Err(_) => "it is not there, either",
+            };
+            return Err(format!("`{uri}` lies outside the model's folder; {advice}"));
         }
         self.others.borrow_mut().extend(note);
         Ok(file)

@@ -67,7 +67,7 @@ pub(super) fn places(node: Item<'_>, data: &Data<'_>) -> Result<(Vec<Mat4>, Vec<
             list.as_ref().map_or(default, |list| list[k].into())
         };
         let rotation = match &rotations {
-            Some(rotations) => rotation(rotations[k])?,
+            Some(rotations) => rotation(rotations[k]),
             None => Quat::IDENTITY,
         };
         let (scale, translation) = (at(&scales, Vec3::ONE), at(&translations, Vec3::ZERO));
@@ -84,8 +84,8 @@ pub(super) fn places(node: Item<'_>, data: &Data<'_>) -> Result<(Vec<Mat4>, Vec<
     Ok((places, others.collect()))
 }
 
-/// Quaternions may be rounded; their length means nothing.
-fn rotation(q: [f32; 4]) -> Result<Quat, String> {
+/// Quaternions may be rounded; their length means nothing. One of zeros turns nothing, as in a node.
+fn rotation(q: [f32; 4]) -> Quat {
     let unit = Vec4::from(q).try_normalize().map(Quat::from_vec4);
-    unit.ok_or_else(|| format!("ROTATION: {q:?} is no rotation"))
+    unit.unwrap_or(Quat::IDENTITY)
 }

@@ -16,7 +16,9 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 /// Roughness above which glass looks frosted.
 const FROSTED: f32 = 0.1;
 
-/// Surface extensions that are not rendered.
+const SPECULAR: &str = "KHR_materials_specular";
+
+/// Surface extensions that are not rendered, or in part.
 const EXTENSIONS: [&str; 9] = [
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -24,7 +26,7 @@ const EXTENSIONS: [&str; 9] = [
     "KHR_materials_dispersion",
     "KHR_materials_iridescence",
     "KHR_materials_sheen",
-    "KHR_materials_specular",
+    SPECULAR,
     "KHR_materials_subsurface",
     "KHR_materials_unlit",
 ];
@@ -99,7 +101,7 @@ fn textured<'a>(
     let color = base_color(material).1;
     found.base_color_texture = color.and_then(|info| take(images.place(info)));
     // With the gloss of an extension it belongs to a fallback.
-    if found.kind == &PRINCIPLED && !material.extension(GLOSSY).is_given() {
+    if found.kind == &PRINCIPLED && gloss(material).is_none() {
         let varied = texture(material.get(METALLIC), "metallicRoughnessTexture");
         let varied = varied.and_then(|info| take(images.place(info)));
         found.metallic_roughness_texture = varied;
@@ -177,7 +179,7 @@ fn alpha_mode(material: Item<'_>) -> String {
 
 /// Linear base colour and texture; from `KHR_materials_pbrSpecularGlossiness` if present.
 fn base_color(material: Item<'_>) -> (Vec4, Option<Item<'_>>) {
-    let (model, factor, key) = match material.extension(GLOSSY).given() {
+    let (model, factor, key) = match gloss(material) {
         Some(model) => (model, "diffuseFactor", "diffuseTexture"),
         None => (
             material.get(METALLIC),
@@ -187,6 +189,21 @@ fn base_color(material: Item<'_>) -> (Vec4, Option<Item<'_>>) {
     };
     let factor = model.vector(factor, [1.0; 4]).into();
     (factor, texture(model, key))
+}
+
+/// The specular-glossiness model of a material. Where a texture varies it, which is not rendered, the metallic-roughness model
+/// beside it is nearer, if there is one.
+fn gloss(material: Item<'_>) -> Option<Item<'_>> {
+    let model = material.extension(GLOSSY).given()?;
+    let varies = texture(model, "specularGlossinessTexture").is_some();
+    (!varies || !material.get(METALLIC).is_given()).then_some(model)
+}
+
+/// Factor on the reflectance of the dielectric part at normal incidence (`KHR_materials_specular`): the mean of its channels.
+fn reflectance(material: Item<'_>) -> f32 {
+    let model = material.extension(SPECULAR);
+    let [r, g, b] = model.vector("specularColorFactor", [1.0; 3]);
+    model.number("specularFactor").unwrap_or(1.0) * (r + g + b) / 3.0
 }
 
 /// What a material says of a texture, if it names one.
@@ -204,7 +221,7 @@ fn convert(
 ) -> Material {
     let (color, _) = base_color(material);
     let model = material.get(METALLIC);
-    let gloss = material.extension(GLOSSY).given();
+    let gloss = gloss(material);
     let transmission = material.extension(TRANSMISSION).given();
     let strength = material.extension("KHR_materials_emissive_strength");
     let strength = strength.number("emissiveStrength").unwrap_or(1.0);
@@ -245,10 +262,11 @@ fn convert(
     };
     let name = material.text("name");
     let name = name.map_or_else(|| format!("material {index}"), str::to_owned);
+    let found = Material::described(name, &description, options.kinds, &files.model, warnings);
     Material {
         emission: emitted(emission),
         emits_both_sides: material.flag("doubleSided") == Some(true),
-        ..Material::described(name, &description, options.kinds, &files.model, warnings)
+        ..found.with_reflectance_times(reflectance(material))
     }
 }
 
@@ -286,10 +304,10 @@ fn warnings(document: Item<'_>, materials: &[Material]) -> Vec<String> {
         let is_metal = m.source.metallic.is_some_and(|metal| metal > 0.5);
         m.kind == &DIFFUSE && is_metal && varied.is_none()
     });
-    let glossy = of(&|_, original| {
-        let model = original.extension(GLOSSY);
-        texture(model, "specularGlossinessTexture").is_some()
-    });
+    let varies = |model: Item<'_>| texture(model, "specularGlossinessTexture").is_some();
+    let glossy = of(&|_, original| gloss(original).is_some_and(varies));
+    let fallen_back =
+        of(&|_, original| gloss(original).is_none() && varies(original.extension(GLOSSY)));
     let tinted = of(&|_, original| {
         let volume = original.extension(VOLUME);
         volume.number("attenuationDistance").is_some()
@@ -299,7 +317,13 @@ fn warnings(document: Item<'_>, materials: &[Material]) -> Vec<String> {
     let occluded = of(&|_, original| texture(original, "occlusionTexture").is_some());
     let extended = EXTENSIONS.iter().filter_map(|name| {
         let names = of(&|_, original| original.extension(name).is_given());
-        approximation_warning(&format!("extended by {name}"), "if it were not", names)
+        let as_if = match *name {
+            SPECULAR => {
+                "if it scaled the reflectance at normal incidence alone, by the mean of its colour"
+            }
+            _ => "if it were not",
+        };
+        approximation_warning(&format!("extended by {name}"), as_if, names)
     });
     [
         approximation_warning("transmissive", "if it were not", transmissive),
@@ -316,6 +340,11 @@ fn warnings(document: Item<'_>, materials: &[Material]) -> Vec<String> {
             "of varying gloss",
             "if the texture of it were white",
             glossy,
+        ),
+        approximation_warning(
+            "of varying gloss",
+            "of the metallic-roughness model beside it",
+            fallen_back,
         ),
     ]
     .into_iter()

@@ -93,10 +93,7 @@ fn quarter() -> Result<[Known; 6], String> {
 /// Materials of a library: `Tr` is what `d` lacks, and a lobe's exponent n has a Beckmann roughness of √(2 / (n + 2)),
 /// of which glTF's is the root.
 fn library() -> Vec<Known> {
-    let mut materials: Vec<Definition> = Vec::new();
-    read(LIBRARY, &mut Unread::default(), |material, _| {
-        materials.push(material)
-    });
+    let materials = read(LIBRARY, &mut Unread::default());
     let of = |name: &str, value: fn(&Definition) -> Option<f32>| {
         let found = materials.iter().find(|material| material.name == name);
         found.and_then(value).map_or(f64::NAN, f64::from)

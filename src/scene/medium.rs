@@ -94,12 +94,21 @@ impl MediumParameters {
         })
     }
 
+    /// A warning of an anisotropy that no phase function hears of.
+    pub(super) fn unheard(&self) -> Option<String> {
+        let is_unheard = self.phase == PhaseFunction::Isotropic && self.anisotropy != 0.0;
+        is_unheard.then(|| {
+            "`anisotropy` says nothing with `phase = \"isotropic\"`, the default: give `phase = \"henyey-greenstein\"`".to_owned()
+        })
+    }
+
     /// The scene with this medium alone, or as it is.
     pub(super) fn applied(&self, mut scene: SceneData) -> Result<SceneData, SceneError> {
         if self.medium.is_empty() {
             return Ok(scene);
         }
         scene.media = vec![self.made(&scene)?];
+        scene.report.warnings.extend(self.unheard());
         scene.hash = scene.content_hash();
         Ok(scene)
     }
@@ -328,6 +337,18 @@ mod tests {
             &[("medium", name("constant")), ("anisotropy", Number(0.5))],
         );
         assert_ne!(other.hash, fog.hash);
+        let notes = |scene: &crate::SceneData| scene.report.lines().join("\n");
+        assert!(notes(&other).contains("`anisotropy` says nothing with `phase = \"isotropic\"`"));
+        assert!(!notes(&fog).contains("anisotropy"));
+        let forward = load_with(
+            "cornell-box",
+            &[
+                ("medium", name("constant")),
+                ("anisotropy", Number(0.5)),
+                ("phase", name("henyey-greenstein")),
+            ],
+        );
+        assert!(!notes(&forward).contains("anisotropy"));
     }
 
     /// A scene in which a mesh of this text encloses a medium.

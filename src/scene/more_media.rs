@@ -31,6 +31,9 @@ pub(super) fn added(mut scene: SceneData, text: &str) -> Result<SceneData, Scene
     for (place, table) in (1..).zip(&tables) {
         let first = scene.media.first().map(|medium| medium.structure.as_str());
         let medium = parameters(table, first).map_err(|e| refused(Some(place), e))?;
+        let unheard = medium.unheard();
+        let unheard = unheard.map(|note| format!("medium {place} of `more_media`: {note}"));
+        scene.report.warnings.extend(unheard);
         let medium = medium.made(&scene).map_err(|e| match e {
             SceneError::Medium { source, .. } => refused(Some(place), source.to_string()),
             other => refused(Some(place), other.to_string()),

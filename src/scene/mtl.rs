@@ -4,7 +4,7 @@ use super::builder::DEFAULT_ALBEDO;
 use super::disguise::Disguise;
 use super::gltf_files::decoded;
 use super::material::{Description, Format, emitted, refracts};
-use super::mtl_statements::{self, Definition, Map};
+use super::mtl_statements::{self, BLACK, Definition, Map};
 use super::mtl_texture::{Statement, statement};
 use super::obj_statements::without_comment;
 use super::tally::{Tally, Unread};
@@ -20,6 +20,7 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use unicode_normalization::UnicodeNormalization as _;
 
 /// Collects the materials of all `mtllib` statements while the OBJ file is read.
 pub(super) struct Library {
@@ -63,8 +64,8 @@ impl Library {
     }
 
     /// Loads the libraries of a statement: a single file whose name may contain blanks, if it
-    /// exists, or several. Returns the indices of their materials by name. Broken libraries are
-    /// warnings.
+    /// exists or only the last word ends as one, or several. Returns the indices of their materials by name. Broken
+    /// libraries are warnings.
     pub(crate) fn load(&self, names: &str) -> HashMap<String, u32> {
         let cut = without_comment(names).trim();
         match [names, cut]
@@ -72,6 +73,7 @@ impl Library {
             .find_map(|name| spelt(&[&self.folder], name))
         {
             Some(name) => self.load_one(&name),
+            None if cut.to_ascii_lowercase().matches(".mtl").count() == 1 => self.load_one(cut),
             None => cut
                 .split_whitespace()
                 .flat_map(|name| self.load_one(name))
@@ -148,7 +150,7 @@ impl Contents {
         let mut unread = Unread::default();
         let mut again = Tally::default();
         let mut without_comments = Vec::new();
-        mtl_statements::read(text, &mut unread, |definition, unread| {
+        for definition in mtl_statements::read(text, &mut unread) {
             let number = self.materials.len() as u32;
             let name = &definition.name;
             without_comments.push((without_comment(name).trim().to_owned(), number));
@@ -156,8 +158,8 @@ impl Contents {
                 numbers.insert(name.clone(), number).is_some(),
                 definition.line,
             );
-            self.add(definition, path, options, unread);
-        });
+            self.add(definition, path, options, &mut unread);
+        }
         for (name, number) in without_comments {
             numbers.entry(name).or_insert(number);
         }
@@ -205,20 +207,20 @@ impl Contents {
             emission,
             source,
             maps: [map_kd, map_ke, map_d, norm],
+            has_roughness,
             ..
         } = definition;
         let folder = file.parent().unwrap_or(Path::new(""));
+        // Programs write a black `Kd` where the texture takes its place.
+        let is_replaced = map_kd.is_some() && diffuse == Some([0.0; 3]);
+        let diffuse = diffuse.filter(|_| !is_replaced);
         // The standard shows textures unscaled by default.
         let unstated = map_kd.as_ref().map_or(DEFAULT_ALBEDO, |_| 1.0);
         // No light is better than light everywhere.
         let unstated_light = map_ke.as_ref().map_or(0.0, |_| 1.0) * f32::from(options.textures);
-        for (map, color, what) in [
-            (&map_kd, diffuse, "`map_Kd` where `Kd` is 0"),
-            (&map_ke, emission, "`map_Ke` where `Ke` is 0"),
-        ] {
-            if let (Some(map), Some([0.0, 0.0, 0.0])) = (map, color) {
-                unread.see(what, map.line);
-            }
+        unread.see_if(is_replaced, "`Kd` of 0 with a `map_Kd`", line);
+        if let (Some(map), Some([0.0, 0.0, 0.0])) = (&map_ke, emission) {
+            unread.see("`map_Ke` where `Ke` is 0", map.line);
         }
         let description = Description {
             format: Format::Mtl,
@@ -233,6 +235,28 @@ impl Contents {
         unread.see_if(
             refracts(source.illum) && !is_glass,
             "`illum` of glass whose `Ni` is 1 and which filters nothing",
+            line,
+        );
+        let opacity = source.opacity.unwrap_or(1.0);
+        for (what, is_so) in [
+            (
+                "`Kd` of glass",
+                diffuse.is_some_and(|kd| kd.iter().any(|part| *part > BLACK)),
+            ),
+            ("`d` of glass", 0.0 < opacity && opacity < 1.0),
+            ("`Pr` of glass", has_roughness && source.metallic.is_some()),
+        ] {
+            unread.see_if(is_glass && is_so, what, line);
+        }
+        let is_plain = found.kind == &DIFFUSE;
+        unread.see_if(
+            is_plain && source.illum == Some(0),
+            "`illum` 0, a colour without light",
+            line,
+        );
+        unread.see_if(
+            is_plain && source.illum == Some(10),
+            "`illum` 10, shadows alone",
             line,
         );
         // Their colours are `Tf` and `Ks`.
@@ -384,8 +408,8 @@ fn place(folders: &[&Path], file: &str, options: &LoadOptions) -> std::io::Resul
     }
 }
 
-/// The file of this name, or else the only one whose name differs in case alone, as those of its folders may: models come
-/// from systems that ignore it.
+/// The file of this name, or else the only one whose name differs in case or in how Unicode composes its letters alone, as
+/// those of its folders may: models come from systems that ignore both.
 pub(super) fn found(folder: &Path, file: &str) -> Option<PathBuf> {
     let path = folder.join(file);
     let is_file = |path: &PathBuf| files().open(path).is_ok();
@@ -397,7 +421,7 @@ pub(super) fn found(folder: &Path, file: &str) -> Option<PathBuf> {
     in_any_case.filter(is_file)
 }
 
-/// What stands in a folder under this name, or else the only thing whose name differs in case alone.
+/// What stands in a folder under this name, or else the only thing whose [`folded`] name is the same.
 fn entry(folder: &Path, name: &OsStr) -> Option<PathBuf> {
     let path = folder.join(name);
     if files().is_folder(&path) || files().open(&path).is_ok() {
@@ -406,7 +430,13 @@ fn entry(folder: &Path, name: &OsStr) -> Option<PathBuf> {
     let parent = Some(folder).filter(|folder| !folder.as_os_str().is_empty());
     let listed = files().list(parent.unwrap_or(Path::new("."))).ok()?;
     let names = listed.iter().filter_map(|other| other.file_name());
-    let mut same = names.filter(|other| other.eq_ignore_ascii_case(name));
+    let mut same = names.filter(|other| folded(other) == folded(name));
     let only = same.next().filter(|_| same.next().is_none())?;
     Some(folder.join(only))
+}
+
+/// A name in lower case and with composed letters: macOS writes `é` as a letter and an accent, others as one character.
+fn folded(name: &OsStr) -> String {
+    let name = name.to_string_lossy();
+    name.nfc().flat_map(char::to_lowercase).collect()
 }

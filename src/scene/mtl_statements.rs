@@ -19,7 +19,12 @@ pub(super) struct Definition {
     pub unused: Vec<&'static str>,
     /// `Tr`, with its line.
     transparency: Option<(f32, usize)>,
+    /// Whether `Pr` is given; where it is not, `Ns` tells the roughness.
+    pub has_roughness: bool,
 }
+
+/// Diffuse colours up to this are those of glass.
+pub(super) const BLACK: f32 = 0.05;
 
 /// The text after the keyword of a texture.
 pub(super) struct Map {
@@ -27,9 +32,9 @@ pub(super) struct Map {
     pub line: usize,
 }
 
-/// Parses a library and passes each material on. Keywords are read in any case.
-pub(super) fn read(text: &str, unread: &mut Unread, mut add: impl FnMut(Definition, &mut Unread)) {
-    let mut current: Option<Definition> = None;
+/// Parses a library. Keywords are read in any case.
+pub(super) fn read(text: &str, unread: &mut Unread) -> Vec<Definition> {
+    let mut found: Vec<Definition> = Vec::new();
     for (line, content) in (1..).zip(text.lines()) {
         let content = content.trim();
         let Some(keyword) = without_comment(content).split_whitespace().next() else {
@@ -38,23 +43,30 @@ pub(super) fn read(text: &str, unread: &mut Unread, mut add: impl FnMut(Definiti
         // Names may contain `#`.
         let rest = content[keyword.len()..].trim();
         if keyword.eq_ignore_ascii_case("newmtl") {
-            let next = Definition {
+            found.push(Definition {
                 name: rest.to_owned(),
                 line,
                 ..Definition::default()
-            };
-            if let Some(done) = current.replace(next) {
-                add(done.finished(unread), unread);
-            }
-        } else if let Some(material) = &mut current {
+            });
+        } else if let Some(material) = found.last_mut() {
             material.statement(keyword, rest, line, unread);
         } else {
             unread.see("statements before the first `newmtl`", line);
         }
     }
-    if let Some(done) = current {
-        add(done.finished(unread), unread);
+    let is_opacity = transparency_is_opacity(&found);
+    for material in &mut found {
+        material.complete(is_opacity, unread);
     }
+    found
+}
+
+/// Whether `Tr` is the opacity in this library: nobody writes materials that cannot be seen, but VTK and others write `Tr 1`
+/// for opaque ones. Where some `Tr` is 0, it is the transparency.
+fn transparency_is_opacity(materials: &[Definition]) -> bool {
+    let alone = materials.iter().filter(|m| m.source.opacity.is_none());
+    let mut given = alone.filter_map(|m| m.transparency.map(|(value, _)| value));
+    given.clone().any(|value| value == 1.0) && given.all(|value| value != 0.0)
 }
 
 impl Definition {
@@ -74,6 +86,12 @@ impl Definition {
         {
             unread.see(&format!("what is below 0 in `{keyword}`"), line);
         }
+        if values_of(&key).is_some_and(|most| words > most) {
+            unread.see(
+                &format!("what stands behind the values of `{keyword}`"),
+                line,
+            );
+        }
         let is_read = match key.as_str() {
             "ka" => true,
             "kd" => set(&mut self.diffuse, color),
@@ -82,7 +100,11 @@ impl Definition {
             "tf" => set(&mut source.filter, color),
             "ns" => set(&mut source.shininess, first),
             "ni" => set(&mut source.ior, first),
-            "d" => set(&mut source.opacity, first),
+            "d" => {
+                let is_halo = rest.starts_with("-halo") && first != Some(1.0);
+                unread.see_if(is_halo, "`-halo` of `d`", line);
+                set(&mut source.opacity, first)
+            }
             "tr" => set(&mut self.transparency, first.map(|t| (t, line))),
             "pr" => set(&mut source.roughness, first),
             "pm" => set(&mut source.metallic, first),
@@ -110,8 +132,8 @@ impl Definition {
         !rest.is_empty()
     }
 
-    /// Completes properties that follow from others.
-    fn finished(mut self, unread: &mut Unread) -> Self {
+    /// Completes properties that follow from others; `is_opacity` says what `Tr` is where there is no `d`.
+    fn complete(&mut self, is_opacity: bool, unread: &mut Unread) {
         // Beckmann roughness of a Phong lobe: alpha^2 = 2 / (n + 2) (Walter et al. 2007); glTF's
         // roughness is the square root of alpha.
         let phong = |n: f32| (2.0 / (n.max(0.0) + 2.0)).powf(0.25);
@@ -119,15 +141,55 @@ impl Definition {
         if source.roughness.is_some() && source.metallic.is_none() {
             unread.see("`Pr` without `Pm`", self.line);
         }
+        self.has_roughness = source.roughness.is_some();
         source.roughness = source.roughness.or(source.shininess.map(phong));
-        if let Some((transparency, line)) = self.transparency {
+        if let Some((opacity, line)) = self.transparency.filter(|_| is_opacity)
+            && source.opacity.is_none()
+        {
+            source.opacity = Some(opacity);
+            unread.see(
+                "`Tr` as transparency: 1 would hide the material, so it is taken as opacity",
+                line,
+            );
+        } else if let Some((transparency, line)) = self.transparency {
             let opacity = *source.opacity.get_or_insert(1.0 - transparency);
             // Some programs write the opacity as `Tr`, too.
             if (opacity + transparency - 1.0).abs() > 1e-3 {
                 unread.see("`Tr` that is not 1 − `d`", line);
             }
         }
-        self
+        if self.shows_its_surface() {
+            self.source.illum = Some(HIGHLIGHTS);
+        }
+    }
+
+    /// Whether the surface itself shows under an illumination model of glass. The models 4 and 9 are those of opaque surfaces
+    /// with `d`, and have no transmitted term; exporters write 4 for all surfaces (Maya), 6 and 9 for those whose `d` is
+    /// below 1 (Blender). Metals transmit nothing. Where `d` is 0, glass is all that can be meant.
+    fn shows_its_surface(&self) -> bool {
+        let opacity = self.source.opacity.unwrap_or(1.0);
+        let is_coloured = self.maps[0].is_some()
+            || (self.diffuse).is_some_and(|kd| kd.iter().any(|part| *part > BLACK));
+        let is_covered_in_part = 0.0 < opacity && opacity < 1.0 || self.maps[2].is_some();
+        let is_metal = self.source.metallic.is_some_and(|metallic| metallic >= 0.5);
+        match self.source.illum {
+            Some(4 | 9) => is_metal || is_covered_in_part || opacity >= 1.0 && is_coloured,
+            Some(6) => is_metal || is_covered_in_part,
+            Some(7) => is_metal,
+            _ => false,
+        }
+    }
+}
+
+/// The illumination model of surfaces with highlights.
+const HIGHLIGHTS: u8 = 2;
+
+/// Most values that a statement takes, if it takes numbers alone.
+fn values_of(key: &str) -> Option<usize> {
+    match key {
+        "kd" | "ke" | "ks" | "tf" => Some(3),
+        "ns" | "ni" | "tr" | "pr" | "pm" | "illum" => Some(1),
+        _ => None,
     }
 }
 
@@ -165,8 +227,7 @@ mod tests {
         let text = "Kd 1 1 1\nnewmtl a\nkd 0.5 # grey\nKs 1 x 1\nNs\nillum 999\n\tKe\t1 2 3e0 4\nKs\n\
                     d -halo 0.25\nTr 0.25\nnewmtl\nKd 1 0\nTr 0.25\nNs 1.0D+01\nillum 2.0\n";
         let mut unread = Unread::default();
-        let mut found = Vec::new();
-        read(text, &mut unread, |material, _| found.push(material));
+        let found = read(text, &mut unread);
         let [a, nameless] = &found[..] else {
             panic!("{} materials", found.len());
         };
@@ -189,10 +250,12 @@ mod tests {
             "the value of `Ns` (line 5)",
             "the value of `illum` (line 6)",
             "the value of `Kd` (line 12)",
+            "`-halo` of `d` (line 9)",
+            "what stands behind the values of `Ke` (line 7)",
             "`Tr` that is not 1 − `d` (line 10)",
         ] {
             assert!(note.contains(part), "{note} lacks {part}");
         }
-        assert_eq!(note.matches("line ").count(), 6, "{note}");
+        assert_eq!(note.matches("line ").count(), 8, "{note}");
     }
 }

@@ -89,6 +89,12 @@ impl Reader<'_> {
         for node in root.children().filter(Node::is_element) {
             match node.tag_name().name() {
                 "mesh" => self.mesh(node, mirror)?,
+                "camera" if camera != Some(node) => {
+                    self.warn(
+                        node,
+                        "a scene has one camera, and this is another: left out",
+                    );
+                }
                 "camera" | "integrator" | "sampler" => {}
                 "emitter" => {
                     let kind = node.attribute("type").unwrap_or_default();
@@ -103,8 +109,18 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Names the children of a node that are neither of these elements nor values of these names.
+    /// Names the children of a node that are neither of these elements nor values of these names, and values given again.
     fn warn_of_others(&mut self, node: Node<'_, '_>, elements: &[&str], values: &[&str]) {
+        for name in values {
+            let mut given = properties(node, name);
+            given.next_back();
+            for earlier in given {
+                self.warn(
+                    earlier,
+                    &format!("a later `{name}` counts in place of this one"),
+                );
+            }
+        }
         for child in node.children().filter(Node::is_element) {
             let (element, name) = (child.tag_name().name(), child.attribute("name"));
             let is_value =
@@ -156,7 +172,8 @@ impl Reader<'_> {
         }
         self.look.camera = Some(Camera {
             eye: eye.as_vec3(),
-            target: (eye + forward.normalize_or_zero()).as_vec3(),
+            // Far enough that rounding the target does not turn the view.
+            target: (eye + forward.normalize_or_zero() * eye.length().max(1.0)).as_vec3(),
             up: up.normalize_or_zero().as_vec3(),
             vertical_fov_degrees: vertical.to_degrees() as f32,
         });
@@ -241,18 +258,38 @@ impl Reader<'_> {
     }
 
     fn material(&mut self, mesh: Node<'_, '_>, name: &str) -> Result<Material, SceneError> {
-        let bsdf = mesh.children().find(|node| node.has_tag_name("bsdf"));
+        let mut bsdfs = mesh.children().filter(|node| node.has_tag_name("bsdf"));
+        let bsdf = bsdfs.next();
+        for another in bsdfs {
+            self.warn(
+                another,
+                "a mesh has one material, and this is another: left out",
+            );
+        }
         let mut material = match bsdf {
             Some(bsdf) => self.bsdf(bsdf, name)?,
             None => Material::diffuse(name, Vec3::splat(ALBEDO)),
         };
+        let mut shines = false;
         for emitter in mesh.children().filter(|n| n.has_tag_name("emitter")) {
+            if shines {
+                self.warn(
+                    emitter,
+                    "a mesh has one emitter, and this is another: left out",
+                );
+                continue;
+            }
             if emitter.attribute("type") != Some("area") {
                 self.warn(emitter, "an emitter of a mesh that is not `area`, left out");
                 continue;
             }
             self.warn_of_others(emitter, &[], &["radiance"]);
-            let radiance = self.color(emitter, "radiance")?.unwrap_or(Vec3::ZERO);
+            let radiance = self.color(emitter, "radiance")?;
+            if radiance.is_none() {
+                self.warn(emitter, "an emitter without `radiance` is dark");
+            }
+            shines = true;
+            let radiance = radiance.unwrap_or(Vec3::ZERO);
             material = material.emitting_from_front(emitted(radiance));
         }
         Ok(material)
@@ -320,7 +357,11 @@ impl Reader<'_> {
                     node,
                     &format!("the material `{other}` is not known; drawn as diffuse"),
                 );
-                Material::diffuse(name, Vec3::splat(ALBEDO))
+                let color = match self.color(node, "albedo")? {
+                    Some(color) => Some(color),
+                    None => self.color(node, "kd")?,
+                };
+                Material::diffuse(name, reflectance(color.unwrap_or(Vec3::splat(ALBEDO))))
             }
         })
     }
@@ -331,6 +372,12 @@ impl Reader<'_> {
             n.has_tag_name("transform") && n.attribute("name").is_none_or(|name| name == "toWorld")
         };
         let mut all = DMat4::IDENTITY;
+        for other in node
+            .children()
+            .filter(|n| n.has_tag_name("transform") && !is_it(n))
+        {
+            self.warn(other, "a `<transform>` that is not `toWorld` is not read");
+        }
         let mut given = node.children().filter(is_it);
         let Some(transform) = given.next_back() else {
             return Ok(all);
@@ -425,12 +472,18 @@ fn line_of(node: Node<'_, '_>) -> u32 {
     node.document().text_pos_at(node.range().start).row
 }
 
-/// The value of property `name` among a node's children: `<float name="fov" value="30"/>`.
+/// Those of a node's children that give property `name` a value: `<float name="fov" value="30"/>`.
+fn properties<'a, 'i>(
+    node: Node<'a, 'i>,
+    name: &str,
+) -> impl DoubleEndedIterator<Item = Node<'a, 'i>> {
+    node.children()
+        .filter(move |n| n.attribute("name") == Some(name) && n.has_attribute("value"))
+}
+
+/// The value of property `name`: the last that is given.
 fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
-    let mut properties = node
-        .children()
-        .filter(|n| n.attribute("name") == Some(name));
-    properties.find_map(|n| n.attribute("value"))
+    properties(node, name).next_back()?.attribute("value")
 }
 
 /// Numbers separated by commas or spaces; `None` if one is invalid or not finite.

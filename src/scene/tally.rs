@@ -80,10 +80,13 @@ impl Unread {
 
 /// One warning for everything in a file that is not read; `None` if there is nothing.
 pub(super) fn unread_warning(what: impl Iterator<Item = String>) -> Option<String> {
-    const SHOWN: usize = 12;
+    const SHOWN: usize = 32;
     let what: Vec<String> = what.collect();
     let shown = what[..what.len().min(SHOWN)].join(", ");
-    let more = if what.len() > SHOWN { ", …" } else { "" };
+    let more = match what.len().saturating_sub(SHOWN) {
+        0 => String::new(),
+        more => format!(", and {more} more"),
+    };
     (!what.is_empty())
         .then(|| format!("not read, and drawn as if it were not there: {shown}{more}"))
 }

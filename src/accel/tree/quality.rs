@@ -218,6 +218,18 @@ mod tests {
     }
 
     #[test]
+    fn the_overlap_of_a_record_is_of_all_triangles_of_a_small_scene() {
+        let soup = crate::fixtures::lattice(8);
+        let mut log = crate::BuildLog::default();
+        let mut tree =
+            Tree::build(&soup, &crate::tree::TreeParameters::default(), &mut log).unwrap();
+        tree.note_epo(&soup);
+        let part = tree.epo(&soup, 1);
+        assert_ne!(tree.epo, Some(part), "too few triangles to tell");
+        assert_eq!(tree.epo, Some(tree.epo(&soup, u64::MAX)));
+    }
+
+    #[test]
     fn a_triangle_in_two_leaves_is_foreign_to_neither() {
         let (mut tree, soup) = two_leaves();
         tree.order = vec![0, 1, 0];

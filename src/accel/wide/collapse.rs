@@ -204,9 +204,9 @@ mod tests {
         tree
     }
 
-    fn settings() -> TreeParameters {
+    fn settings(leaf_size: usize) -> TreeParameters {
         TreeParameters {
-            leaf_size: 3,
+            leaf_size,
             intersection_cost: 0.6,
             ..TreeParameters::default()
         }
@@ -214,10 +214,11 @@ mod tests {
 
     /// Least cost of all ways to collapse, by exhaustive search: every set of roots that represents
     /// the subtree of a node is opened root by root.
-    fn least_cost(tree: &Tree, node: usize, count: &dyn Fn(usize) -> u32, width: usize) -> f32 {
+    fn least_cost(tree: &Tree, node: usize, width: usize, leaf_size: u32) -> f32 {
         let area = tree.nodes[node].bounds.half_area();
-        let as_leaf = if count(node) <= 3 {
-            area * count(node) as f32 * 0.6
+        let count = below(tree, node);
+        let as_leaf = if count <= leaf_size {
+            area * count as f32 * 0.6
         } else {
             f32::INFINITY
         };
@@ -227,8 +228,8 @@ mod tests {
         let mut best = f32::INFINITY;
         let mut sets = vec![vec![left as usize, right as usize]];
         while let Some(set) = sets.pop() {
-            let cost: f32 = set.iter().map(|&n| least_cost(tree, n, count, width)).sum();
-            best = best.min(cost);
+            let costs = set.iter().map(|&n| least_cost(tree, n, width, leaf_size));
+            best = best.min(costs.sum());
             for (place, &member) in set.iter().enumerate() {
                 if let NodeKind::Inner { left, right } = tree.nodes[member].kind
                     && set.len() < width
@@ -254,20 +255,26 @@ mod tests {
     #[test]
     fn no_other_collapse_is_cheaper() {
         let mut random = Pcg32::new(3);
-        for _ in 0..60 {
+        for round in 0..60 {
+            let leaf_size = 1 + round % 3;
             let tree = random_tree(4 + random.below(5) as u32, &mut random);
-            let triangles: Vec<u32> = (0..tree.nodes.len()).map(|n| below(&tree, n)).collect();
             for width in [2, 3, 4] {
                 let shape = Shape {
                     width,
                     by_octant: false,
                 };
-                let wide = WideTree::collapse(&tree, shape, &settings());
+                let wide = WideTree::collapse(&tree, shape, &settings(leaf_size));
+                let children = wide.nodes.iter().flatten();
+                let largest = children.filter_map(|child| match child.kind {
+                    WideKind::Leaf { count, .. } => Some(count as usize),
+                    WideKind::Node(_) => None,
+                });
+                assert!(largest.max() <= Some(leaf_size));
                 let found = cost_of(&wide, 0, &tree.nodes[0].bounds);
-                let least = least_cost(&tree, 0, &|n| triangles[n], width);
+                let least = least_cost(&tree, 0, width, leaf_size as u32);
                 assert!(
                     (found - least).abs() <= 1e-4 * least,
-                    "{width}: {found}, {least}"
+                    "{width}, {leaf_size}: {found}, {least}"
                 );
             }
         }

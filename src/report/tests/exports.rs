@@ -39,6 +39,57 @@ fn latex_has_a_command_for_every_character_of_a_report() {
 }
 
 #[test]
+fn a_line_of_csv_has_each_figure_under_its_head() {
+    let mut lines = small_run();
+    for line in &mut lines {
+        if let Body::Structure(record) = &mut line.body {
+            record.stats.nodes = 1234;
+        }
+    }
+    let csv = text(&lines, "csv", &["accel=bvh"]).unwrap();
+    let mut rows = csv.lines();
+    let heads = rows.next().unwrap();
+    assert!(
+        heads.ends_with(",figure,title,unit,value,low,high,interval"),
+        "{heads}"
+    );
+    let place = |name: &str| heads.split(',').position(|head| head == name).unwrap();
+    let nodes: Vec<&str> = rows
+        .find(|row| row.contains(",1234,"))
+        .unwrap()
+        .split(',')
+        .collect();
+    let of = [
+        "scene", "accel", "figure", "title", "unit", "value", "low", "high",
+    ];
+    let found = of.map(|name| nodes[place(name)]);
+    assert_eq!(
+        found,
+        [
+            "cornell-box",
+            "bvh",
+            "nodes",
+            "nodes",
+            "",
+            "1234",
+            "1234",
+            "1234"
+        ]
+    );
+    // Speeds have intervals around them.
+    let speed = csv
+        .lines()
+        .find(|row| row.contains(",mrays-per-s,"))
+        .unwrap();
+    let speed: Vec<&str> = speed.split(',').collect();
+    assert_eq!(speed[place("unit")], "Mrays/s");
+    let [low, value, high] =
+        ["low", "value", "high"].map(|name| speed[place(name)].parse().unwrap());
+    let _: f64 = value;
+    assert!(low < value && value < high, "{speed:?}");
+}
+
+#[test]
 fn a_label_with_parameters_is_chosen_as_it_is_written() {
     let mut lines = full_run();
     let label = "uniform-grid(lambda=3,cells=2)";

@@ -49,3 +49,22 @@ fn rendering_decides_and_a_class_of_rays_that_says_otherwise_is_warned_of() {
     let (answer, warned) = said(&[("bvh", 5.0, 1.0), ("grid", 5.02, 1.6)]);
     assert_eq!((&*answer, warned.len()), ("bvh", 0));
 }
+
+#[test]
+fn samplers_are_compared_per_second_under_the_fastest_structure_that_was_timed_with_most_of_them() {
+    let view = ["cornell-box", "path"];
+    let of_others = small_run().into_iter().filter(|line| {
+        let is_time = matches!(line.body, Body::Time(_));
+        !is_time
+    });
+    let mut lines: Vec<Line> = of_others.collect();
+    lines.extend(times(
+        view,
+        &[("slow", 2.0), ("fast", 0.8), ("slowest", 3.0)],
+    ));
+    let one_sampler = times(view, &[("fastest", 0.1)]).swap_remove(0);
+    lines.push(one_sampler);
+    let data = RunData::new(&lines);
+    let found = path_view(&data).fastest_structure();
+    assert_eq!(found.as_deref(), Some("fast"));
+}

@@ -205,4 +205,26 @@ mod tests {
             assert!(absorbs.iter().all(|a| *a < 1e-5), "{name}");
         }
     }
+
+    #[test]
+    fn a_cloud_has_its_density_where_it_is_densest_and_its_albedo_everywhere() {
+        let parameters = [("density", Number(12.0)), ("albedo", Number(0.75))];
+        let scene = load_with("cloud", &parameters);
+        let volume = &scene.media[0].volume;
+        let voxels = volume.scattering.iter().zip(&volume.absorption);
+        let extinctions: Vec<f32> = voxels.clone().map(|(s, a)| s + a).collect();
+        let densest = extinctions.iter().copied().fold(0.0, f32::max);
+        assert!((densest - 12.0).abs() < 1e-4, "{densest}");
+        for ((scattered, _), extinction) in voxels.zip(&extinctions) {
+            assert!((scattered - 0.75 * extinction).abs() < 1e-4 * densest);
+        }
+        // The same cloud, thinner in proportion.
+        let thin = load_with("cloud", &[("density", Number(3.0))]);
+        let thin = &thin.media[0].volume;
+        for (k, extinction) in extinctions.iter().enumerate() {
+            let here = thin.scattering[k] + thin.absorption[k];
+            assert!((4.0 * here - extinction).abs() < 1e-4 * densest, "{k}");
+        }
+        assert_eq!((volume.high - volume.low).x, 4.0);
+    }
 }

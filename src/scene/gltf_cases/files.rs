@@ -83,6 +83,18 @@ fn files_are_found_as_exporters_name_them() {
         .beside("Data.BIN", "data.bin")
         .load()
         .but(2, &["`data.bin` is not there: ", "Data.BIN is read"]);
+    // As archives of macOS hold it: a letter and its accent.
+    case("a file in decomposed letters")
+        .beside("ka\u{308}se.bin", "k\u{e4}se.bin")
+        .load()
+        .but(
+            2,
+            &["`k\u{e4}se.bin` is not there: ", "ka\u{308}se.bin is read"],
+        );
+    case("a file in capital letters beyond ASCII")
+        .beside("K\u{c4}SE.bin", "k\u{e4}se.bin")
+        .load()
+        .but(2, &["K\u{c4}SE.bin is read"]);
     let pointer = b"version https://git-lfs.github.com/spec/v1\n".to_vec();
     case("a pointer to a file")
         .file("quad.bin", pointer)

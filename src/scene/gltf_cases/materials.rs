@@ -153,8 +153,8 @@ fn images_that_cannot_be_had_leave_the_constant() {
         ),
         (
             "/images/0/uri",
-            json!("../wood.png"),
-            "outside the model's folder",
+            json!("../tree.png"),
+            "outside the model's folder; it is not there, either",
         ),
     ] {
         let case = textured(path).set(path, value);
@@ -201,6 +201,17 @@ fn images_are_found_however_they_are_named() {
             .set("/images/0/uri", json!(uri))
             .load()
             .whole(2)
+            .images(1);
+    }
+    for uri in [
+        "C:\\Users\\me\\wood.png",
+        "/home/me/wood.png",
+        "Textures/wood.png",
+    ] {
+        textured("the path of another machine")
+            .set("/images/0/uri", json!(uri))
+            .load()
+            .but(2, &["is not there: ", "wood.png is read"])
             .images(1);
     }
     textured("a sampler that is not there")
@@ -361,6 +372,25 @@ fn surfaces_that_are_drawn_otherwise_are_named() {
     let material = &glossy.scene().materials[0];
     assert_eq!(material.metallic_roughness_texture, None);
     assert_eq!(material.parameters[1], 0.75);
+    let varied = json!({"specularFactor": [1, 1, 1], "specularGlossinessTexture": {"index": 0}});
+    let fallback = textured("gloss of a texture")
+        .set(
+            "/materials/0/extensions",
+            json!({"KHR_materials_pbrSpecularGlossiness": varied}),
+        )
+        .load()
+        .but(
+            2,
+            &[
+                "1 material is of varying gloss",
+                "of the metallic-roughness model beside it: wood",
+            ],
+        )
+        .color(PLAIN);
+    let [metallic, roughness, _] = fallback.scene().materials[0].parameters[..] else {
+        panic!("another kind")
+    };
+    assert_eq!((metallic, roughness), (0.0, 1.0));
     case("a short colour")
         .material(json!({"pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3], "metallicFactor": 0}}))
         .load()
@@ -380,4 +410,59 @@ fn surfaces_that_are_drawn_otherwise_are_named() {
         .material(json!({"name": "lava", "alphaMode": "GLOW"}))
         .load()
         .but(2, &["unknown alpha mode", "drawn as opaque: lava"]);
+}
+
+/// The reflectance at normal incidence of a dielectric with these extensions.
+fn reflectance(extensions: &Value) -> f32 {
+    let material = json!({"name": "shell", "pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": extensions});
+    let loaded = case("a reflectance").material(material).load();
+    loaded.scene().materials[0].parameters[2]
+}
+
+#[test]
+fn reflectances_are_those_of_the_index_times_the_specular_colour() {
+    let ior = |ior: f32| json!({"KHR_materials_ior": {"ior": ior}});
+    let both = |ior: f32, specular: Value| json!({"KHR_materials_ior": {"ior": ior}, "KHR_materials_specular": specular});
+    let grey = |x: f32| json!({"specularColorFactor": [x, x, x]});
+    for (extensions, expected) in [
+        (json!({}), 0.04),
+        (ior(2.0), 1.0 / 9.0),
+        (ior(1.0), 0.0),
+        // As the extension has it, for what was converted from specular-glossiness.
+        (ior(0.0), 1.0),
+        (both(0.0, grey(0.04)), 0.04),
+        (both(1.5, grey(0.5)), 0.02),
+        (both(1.5, json!({"specularFactor": 0.25})), 0.01),
+        (
+            both(
+                1.5,
+                json!({"specularFactor": 0.5, "specularColorFactor": [3, 1.5, 0]}),
+            ),
+            0.03,
+        ),
+        (both(2.0, json!({"specularColorFactor": [20, 20, 20]})), 1.0),
+    ] {
+        let found = reflectance(&extensions);
+        assert!((found - expected).abs() < 1e-6, "{extensions}: {found}");
+    }
+}
+
+#[test]
+fn a_black_texture_leaves_no_light_and_the_sky_shines() {
+    let black = image::RgbImage::new(2, 1);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let png = image::ImageFormat::Png;
+    black.write_to(&mut bytes, png).expect("an image");
+    let glowing = |name| {
+        textured(name)
+            .set("/materials/0/emissiveFactor", json!([1, 1, 1]))
+            .set("/materials/0/emissiveTexture", json!({"index": 0}))
+    };
+    let dark = glowing("a black emission")
+        .file("wood.png", bytes.into_inner())
+        .load();
+    assert_eq!(dark.scene().materials[0].emission, Vec3::ZERO);
+    assert!(dark.scene().daylight.is_some());
+    let lit = glowing("an emission").load();
+    assert!(lit.scene().materials[0].emission != Vec3::ZERO && lit.scene().daylight.is_none());
 }

@@ -283,6 +283,17 @@ fn instances_are_drawn_in_every_type() {
         scene.scene().triangles[2].vertices[2],
         Vec3::new(7.0, 2.0, 0.0)
     );
+    let still = with(
+        "turned by nothing",
+        json!({"TRANSLATION": 2, "ROTATION": 4}),
+    )
+    .accessor(floats([0.0; 8]), 5126, "VEC4", 2)
+    .load()
+    .whole(4);
+    assert_eq!(
+        still.scene().triangles[2].vertices[2],
+        Vec3::new(6.0, 1.0, 0.0)
+    );
     with("nothing to tell them apart", json!({"_ID": 3}))
         .load()
         .but(2, &["`_ID` of instances", "node 0"]);

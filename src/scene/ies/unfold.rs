@@ -13,6 +13,15 @@ impl IesProfile {
         let unknown =
             || format!("horizontal angles from {first} to {last} are none of the standard");
         if self.photometry != Photometry::C {
+            if self.horizontal.len() == 1 {
+                self.warnings.push(format!(
+                    "{}, line {line}: there is one horizontal angle, {first}; its intensities are taken for all",
+                    self.name
+                ));
+                self.horizontal = vec![-90.0, 90.0];
+                self.candela.extend_from_within(..);
+                return Ok(());
+            }
             // Narrow beams are measured as far as they go.
             let is_known = last > 0.0 && last <= 90.0 + SAME;
             return match is_known {

@@ -1,10 +1,10 @@
 //! Smooth dielectrics: glass, water, and thin panes.
 //!
-//! * MTL: illumination models 4, 6, 7 and 9 refract. The index is `Ni` (default 1.5); the body
-//!   filters light by `Tf`, by its square root at each of two surfaces. A missing or black `Tf`
-//!   filters nothing: exporters write 0 for "not stated". An index of 1 without a filter would be
-//!   nothing to see, and is no glass. `d` below 1 with another model is partial
-//!   coverage, which no kind renders yet.
+//! * MTL: illumination models 4, 6, 7 and 9 refract, where the reader of the file leaves them to a
+//!   material: opaque and partly covering surfaces with 4, 6 or 9 have another. The index is `Ni`
+//!   (default 1.5); the body filters light by `Tf`, by its square root at each of two surfaces. A
+//!   missing or black `Tf` filters nothing: exporters write 0 for "not stated". An index of 1
+//!   without a filter would be nothing to see, and is no glass.
 //! * glTF: `KHR_materials_transmission` of at least a half on non-metals, with the base colour as
 //!   tint and `KHR_materials_ior` (default 1.5). Walls are thin, as in the standard, unless
 //!   `KHR_materials_volume` gives them a thickness.

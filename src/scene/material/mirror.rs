@@ -25,8 +25,10 @@ fn recognise(description: &Description<'_>) -> Option<Look> {
     let (is_mirror, base_color) = match description.format {
         Format::Mtl => {
             let specular = Vec3::from(source.specular.unwrap_or_default());
+            // Those with a metalness are of the metallic-roughness model.
+            let is_plain = source.metallic.is_none();
             (
-                outshines(source.illum, description.base_color, specular),
+                is_plain && outshines(source.illum, description.base_color, specular),
                 specular,
             )
         }

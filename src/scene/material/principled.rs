@@ -25,9 +25,10 @@ pub static PRINCIPLED: MaterialKind = MaterialKind {
 /// Reflectance of a dielectric in the specular-glossiness model.
 const DIELECTRIC_F0: f32 = 0.04;
 
-/// Normal-incidence reflectance of a dielectric with this index of refraction; of glass if invalid.
+/// Normal-incidence reflectance of a dielectric with this index of refraction; of glass if invalid. An index of 0 reflects
+/// everything, as `KHR_materials_ior` has it.
 pub fn reflectance_of_ior(ior: f32) -> f32 {
-    let ior = if ior.is_finite() && ior > 0.0 {
+    let ior = if ior.is_finite() && ior >= 0.0 {
         ior
     } else {
         DEFAULT_IOR
@@ -38,7 +39,9 @@ pub fn reflectance_of_ior(ior: f32) -> f32 {
 fn recognise(description: &Description<'_>) -> Option<Look> {
     let source = description.source;
     let roughness = source.roughness.unwrap_or(1.0);
-    let f0 = reflectance_of_ior(source.ior.unwrap_or(DEFAULT_IOR));
+    // An index of 0 has a meaning in glTF alone.
+    let is_known = |ior: &f32| *ior > 0.0 || description.format == Format::Gltf;
+    let f0 = reflectance_of_ior(source.ior.filter(is_known).unwrap_or(DEFAULT_IOR));
     match (description.format, source.metallic, source.specular) {
         (_, Some(metallic), _) if !description.is_varied || description.is_followed => {
             Some(look(description.base_color, metallic, roughness, f0))
@@ -82,6 +85,16 @@ fn solved_metallic(diffuse: f32, specular: f32, left: f32) -> f32 {
 }
 
 impl Material {
+    /// Scales the reflectance of the dielectric part at normal incidence. Other kinds are unchanged.
+    pub(in super::super) fn with_reflectance_times(mut self, factor: f32) -> Self {
+        if self.kind == &PRINCIPLED
+            && let [_, _, f0] = &mut self.parameters[..]
+        {
+            *f0 = within(*f0 * factor, 0.0, 1.0);
+        }
+        self
+    }
+
     /// A metallic-roughness material: linear RGB base colour (diffuse or metallic), metalness,
     /// roughness and normal-incidence reflectance of the dielectric, each in [0, 1].
     pub fn principled(
@@ -125,7 +138,8 @@ mod tests {
             assert_eq!(recognised(format, source(None, None)), None);
         }
         let (_, parameters) = recognised(Format::Gltf, source(Some(2.0), Some(0.0))).unwrap();
-        assert_eq!(parameters[0], 1.0);
+        assert_eq!((parameters[0], parameters[2]), (1.0, 1.0));
+        let (_, parameters) = recognised(Format::Mtl, source(Some(2.0), Some(0.0))).unwrap();
         assert!((parameters[2] - 0.04).abs() < 1e-6, "the index of glass");
     }
 

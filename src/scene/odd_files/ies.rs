@@ -42,6 +42,23 @@ const IES: &[(&str, Outcome, &str)] = &[
         Ok([90.0, 60.0, 55.0]),
         "",
     ),
+    // The number that is kept for future use, below a label of no year.
+    (
+        "TILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 0 0\n0 90\n0\n90 30\n",
+        Ok([90.0, 60.0, 60.0]),
+        "",
+    ),
+    // Type B: the same from all sides, up to 90 degrees from straight ahead (x).
+    (
+        "IESNA91\nTILT=NONE\n1 -1 1 3 1 2 2 0 0 0\n1 1 0\n-90 0 90\n0\n10 90 30\n",
+        Ok([90.0, 90.0, 60.0]),
+        "line 6: there is one horizontal angle, 0; its intensities are taken for all",
+    ),
+    (
+        "IESNA91\nTILT=NONE\n1 -1 1 2 2 2 2 0 0 0\n1 1 0\n0 90\n0 90\n90 30\n90 30\n",
+        Ok([90.0, 90.0, 60.0]),
+        "line 6: the vertical angles of a luminaire of type A or B begin at 0",
+    ),
     (
         "IESNA91\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 0\n0 90\n0\n90 30\n7\n",
         Ok([90.0, 60.0, 60.0]),

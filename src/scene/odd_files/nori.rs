@@ -20,6 +20,59 @@ const NORI: &[(&str, &str, Outcome)] = &[
         ),
     ),
     (
+        "<bsdf type=\"diffuse\"><color name=\"albedo\" value=\"0 1 0\"/><color name=\"albedo\" value=\"1 0 0\"/></bsdf>",
+        "",
+        Reads(
+            "r",
+            &["line 4: a later `albedo` counts in place of this one"],
+        ),
+    ),
+    (
+        "<bsdf type=\"diffuse\"><color name=\"albedo\" value=\"1 0 0\"/></bsdf><bsdf type=\"mirror\"/>",
+        "",
+        Reads(
+            "r",
+            &["line 4: a mesh has one material, and this is another: left out"],
+        ),
+    ),
+    (
+        "<emitter type=\"area\"><color name=\"radiance\" value=\"1 1 1\"/></emitter><emitter type=\"area\"/>",
+        "",
+        Reads(
+            ".",
+            &["line 4: a mesh has one emitter, and this is another: left out"],
+        ),
+    ),
+    (
+        "<emitter type=\"area\"/>",
+        "",
+        Reads(".", &["line 4: an emitter without `radiance` is dark"]),
+    ),
+    (
+        "<transform name=\"toLocal\"/>",
+        "",
+        Reads(
+            ".",
+            &["line 4: a `<transform>` that is not `toWorld` is not read"],
+        ),
+    ),
+    (
+        "<bsdf type=\"velvet\"><color name=\"albedo\" value=\"1 0 0\"/></bsdf>",
+        "",
+        Reads(
+            "r",
+            &["the material `velvet` is not known; drawn as diffuse"],
+        ),
+    ),
+    (
+        "",
+        "<camera type=\"perspective\"/><camera type=\"perspective\"><float name=\"fov\" value=\"0\"/></camera>",
+        Reads(
+            ".",
+            &["line 2: a scene has one camera, and this is another: left out"],
+        ),
+    ),
+    (
         "<bsdf type=\"diffuse\"><texture type=\"checkerboard_color\" name=\"albedo\"/></bsdf>",
         "",
         Reads(".", &["`<texture>` `albedo` of `<bsdf>` is not read"]),
@@ -131,4 +184,23 @@ fn scenes_of_mitsuba_are_told_from_those_of_nori() {
         "give its meshes as",
     ]);
     check("mitsuba", load_files(&[("a.xml", text)]), &fails);
+}
+
+#[test]
+fn a_camera_looks_where_it_does_however_far_it_stands() {
+    for scale in [1.0, 1e4, 1e7] {
+        let [origin, target] = [[3.0, 1.0, 2.0], [0.0, 0.5, -1.0]].map(|at| at.map(|x| scale * x));
+        let list = |at: [f64; 3]| at.map(|x| x.to_string()).join(", ");
+        let text = format!(
+            "<scene><camera type=\"perspective\"><transform name=\"toWorld\"><lookat origin=\"{}\" target=\"{}\" up=\"0, 1, 0\"/></transform></camera>\n\
+             <mesh type=\"obj\"><string name=\"filename\" value=\"m.obj\"/></mesh></scene>",
+            list(origin),
+            list(target)
+        );
+        let scene = load_files(&[("a.xml", text.as_bytes()), ("m.obj", MESH)]).expect("a scene");
+        let camera = scene.camera.expect("a camera");
+        let found = (camera.target - camera.eye).normalize();
+        let expected = glam::Vec3::new(-3.0, -0.5, -3.0).normalize();
+        assert!(found.distance(expected) < 1e-5, "{scale}: {found}");
+    }
 }

@@ -38,6 +38,10 @@ const OBJ: &[(&str, Outcome)] = &[
     ),
     ("mtllib \"m.mtl\"\nusemtl red\nf 1 2 3\n", Reads("r", &[])),
     (
+        "mtllib C:\\my work\\m.mtl\nusemtl red\nf 1 2 3\n",
+        Reads("r", &["m.mtl is read in its place"]),
+    ),
+    (
         "mtllib C:\\work\\m.mtl\nusemtl red\nf 1 2 3\n",
         Reads("r", &["is read in its place"]),
     ),
@@ -343,7 +347,7 @@ const MTL: &[(&str, Outcome)] = &[
     ),
     (
         "newmtl a\nKd 0 0 0\nmap_Kd t.png",
-        Reads(".", &["`map_Kd` where `Kd` is 0 (line 3)"]),
+        Reads(".", &["`Kd` of 0 with a `map_Kd` (line 1)"]),
     ),
     (
         "newmtl a\nKd 1 0 0\nillum 11",
@@ -351,12 +355,68 @@ const MTL: &[(&str, Outcome)] = &[
     ),
     (
         "newmtl a\nKd 1 0 0\nTr 1",
+        Reads("r", &["it is taken as opacity (line 3)"]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nTr 1\nnewmtl b\nTr 0",
         Reads(
             "r",
             &["1 material is wholly transparent, by `d` or `Tr` (line 1)"],
         ),
     ),
-    ("newmtl a\nKd 1 0 0\nd 0\nillum 4", Reads(".", &[])),
+    (
+        "newmtl a\nKd 1 0 0\nd 0\nTr 1",
+        Reads(
+            "r",
+            &["1 material is wholly transparent, by `d` or `Tr` (line 1)"],
+        ),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nTr 1 illum 3",
+        Reads("r", &["what stands behind the values of `Tr` (line 3)"]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0 1\nillum 2 # two",
+        Reads("r", &["what stands behind the values of `Kd` (line 2)"]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nd -halo 0.5",
+        Reads("r", &["`-halo` of `d` (line 3)"]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nillum 0",
+        Reads("r", &["`illum` 0, a colour without light (line 1)"]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nillum 10",
+        Reads("r", &["`illum` 10, shadows alone (line 1)"]),
+    ),
+    // Opaque surfaces by Maya and Blender, whose models are those of glass.
+    (
+        "newmtl a\nKd 1 0 0\nillum 4\nTf 1 1 1\nNi 1.86",
+        Reads("r", &[]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nillum 9\nd 0.9\nNi 1.45",
+        Reads("r", &[]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nillum 6\nd 0.9\nPm 1\nPr 0.5",
+        Reads("r", &[]),
+    ),
+    ("newmtl a\nKd 1 0 0\nillum 7\nPm 1\nPr 0.5", Reads("r", &[])),
+    ("newmtl a\nKd 0 0 0\nillum 9\nNi 1.5", Reads(".", &[])),
+    (
+        "newmtl a\nKd 1 0 0\nillum 7\nd 0.5\nPm 0\nPr 0.8",
+        Reads(
+            ".",
+            &["`Kd` of glass (line 1), `Pr` of glass (line 1), `d` of glass (line 1)"],
+        ),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nd 0\nillum 4",
+        Reads(".", &["`Kd` of glass (line 1)"]),
+    ),
     (
         "newmtl a\nKd 1 0 0\nmap_Kd ..\\maps\\t.png",
         Reads("r", &["1 texture is not where it should be (line 3)"]),
@@ -372,9 +432,9 @@ const MTL: &[(&str, Outcome)] = &[
     ),
     ("newmtl a\nKd 1 0 0\nPr 0.5\nPm 0", Reads("r", &[])),
     (
-        "newmtl a\nKd 1 0 0\nillum 4\nTf 1 1 1\nNi 1.00",
+        "newmtl a\nKd 0 0 0\nillum 4\nTf 1 1 1\nNi 1.00",
         Reads(
-            "r",
+            ".",
             &["`illum` of glass whose `Ni` is 1 and which filters nothing (line 1)"],
         ),
     ),
@@ -383,7 +443,7 @@ const MTL: &[(&str, Outcome)] = &[
         Reads("r", &[]),
     ),
     (
-        "newmtl a\nillum 4\nnorm t.png\nmap_Kd t.png",
+        "newmtl a\nillum 7\nnorm t.png\nmap_Kd t.png",
         Reads(".", &["`map_Kd` of glass or a mirror (line 4)"]),
     ),
     (
@@ -481,6 +541,10 @@ fn a_blank_in_the_name_of_a_library_may_be_written_in_three_ways() {
         ];
         check(name, load_files(&files), &Reads("r", &[]));
     }
+    let model = b"mtllib sub dir/my m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nusemtl red\nf 1 2 3\n";
+    let files: [(&str, &[u8]); 2] = [("a.obj", model), ("my m.mtl", RED_AND_BLUE.as_bytes())];
+    let note = &["my m.mtl is read in its place"];
+    check("another folder", load_files(&files), &Reads("r", note));
 }
 
 #[test]

@@ -115,7 +115,7 @@ fn shapeless(corner: impl Fn(&mut Pcg32) -> Vec3) -> impl Fn(&mut Pcg32) -> Mesh
 
 pub(super) fn random_bits(maker: &mut Maker) {
     for (name, limit) in [
-        ("up to 1e9", 1e9),
+        ("up to 1e6", 1e6),
         ("up to the limit of coordinates", MAX_COORDINATE),
     ] {
         let vector = move |random: &mut Pcg32| Vec3::from([0; 3].map(|_| number(random, limit)));

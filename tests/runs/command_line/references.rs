@@ -176,6 +176,38 @@ fn with_cache(folder: &Path, cache: &Path, name: &str, more: &[&str]) -> (bool, 
     (references[0].cached, errors.collect())
 }
 
+/// The pixels of the parts of references that this cache keeps: the end of each file, before its hash.
+fn kept_parts(cache: &Path) -> Vec<Vec<f32>> {
+    const PIXELS: usize = 24 * 16 * 12;
+    const HASH: usize = 32;
+    let files = std::fs::read_dir(cache.join("references")).expect("a folder");
+    let parts = files.map(|file| {
+        let bytes = std::fs::read(file.expect("an entry").path()).expect("a readable file");
+        let end = bytes.len() - HASH;
+        let values = bytes[end - PIXELS..end].as_chunks::<4>().0.iter();
+        values.map(|value| f32::from_le_bytes(*value)).collect()
+    });
+    parts.collect()
+}
+
+#[test]
+fn a_reference_is_the_mean_of_eight_different_parts() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let cache = folder.path().join("cache");
+    with_cache(folder.path(), &cache, "run", &["--images", "pfm"]);
+    let parts = kept_parts(&cache);
+    assert_eq!(parts.len(), 8);
+    for (k, part) in parts.iter().enumerate() {
+        assert!(!parts[..k].contains(part), "two parts are the same image");
+    }
+    let reference = linear(&folder.path().join("run"), "reference", ".pfm");
+    let reference = read_linear(&reference).expect("an image");
+    for (k, value) in reference.pixels.iter().flatten().enumerate() {
+        let mean = parts.iter().map(|part| f64::from(part[k])).sum::<f64>() / 8.0;
+        assert!((f64::from(*value) - mean).abs() <= 1e-6 * mean, "{k}");
+    }
+}
+
 #[test]
 fn a_reference_is_rendered_once_for_all_runs_that_it_serves() {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -41,6 +41,8 @@ const SEED: u64 = 77;
 const NOISE: [f64; 2] = [0.6, 0.2];
 /// … and so much times the share of energy that is dropped.
 const DROPPED: f64 = 6.0;
+/// Photons through the cross-section of a voxel from which even points are more even there than random ones.
+const EVEN: f64 = 2.0;
 /// A smoothed grid blurs this much more, and a pyramid so much more again.
 const WIDE: f64 = 3.0;
 
@@ -497,7 +499,8 @@ impl Judge<'_> {
             // The widest cell that a rule may choose.
             _ => WIDE * WIDE,
         };
-        let noise = NOISE[usize::from(self.even)] / through.sqrt();
+        let are_even = self.even && through >= EVEN;
+        let noise = NOISE[usize::from(are_even)] / through.sqrt();
         let slack = self.blur * wide + noise + DROPPED * dropped;
         if rmse <= slack && bias.abs() <= slack {
             return Ok(Judged {
