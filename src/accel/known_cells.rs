@@ -93,4 +93,17 @@ mod tests {
     fn they_are_as_by_hand() {
         assert_eq!(super::check(), Ok(()));
     }
+
+    #[test]
+    fn neighbours_stay_apart_where_a_box_around_both_costs_more() {
+        use super::*;
+        // Two cubes with a triangle each cost 2 · 3 · (1 + 1) in half areas, and as one box 5 · (2 + 1).
+        let lattice: Vec<Triangle> = (0..64)
+            .map(|k| in_cell([k % 8, k / 8 % 4, k / 32]))
+            .collect();
+        let set = [("lambda1", 1.0), ("lambda2", 0.001)];
+        let set = set.map(|(name, value)| (name.to_owned(), ParamValue::Number(value)));
+        let found = stats_with("irregular-grid", &Params(set.into()), &lattice).unwrap();
+        assert_eq!(found.nodes, 64);
+    }
 }

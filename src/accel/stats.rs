@@ -148,3 +148,19 @@ fn most_bytes(gpu: &Gpu) -> u64 {
         .max_storage_buffer_binding_size
         .min(limits.max_buffer_size)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pass_that_runs_several_times_has_the_sum_of_its_times() {
+        let mut log = BuildLog::default();
+        for (name, ms) in [("sort", 1.0), ("merge", 8.0), ("sort", 2.0), ("sort", 4.0)] {
+            log.note(name, ms);
+        }
+        let phases: Vec<(&str, f64)> = log.phases.iter().map(|p| (&*p.name, p.ms)).collect();
+        assert_eq!(phases, [("sort", 7.0), ("merge", 8.0)]);
+        assert_eq!(log.total_ms(), 15.0);
+    }
+}

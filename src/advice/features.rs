@@ -227,5 +227,8 @@ mod tests {
             (per_triangle * 12.0 / 2.0 - 1.0).abs() < 0.01,
             "{features:?}"
         );
+        // Boxes of both halves of a wall are the wall.
+        let boxes = features.boxes_crossed / many.len() as f64;
+        assert!((boxes * 12.0 / 4.0 - 1.0).abs() < 0.01, "{features:?}");
     }
 }

@@ -150,4 +150,33 @@ mod tests {
         assert_eq!(misled.iter().filter(|t| t.regret > 0.0).count(), 1);
         assert!((regret.mean - expected / 20.0).abs() < 1e-6, "{regret:?}");
     }
+
+    #[test]
+    fn scenes_that_differ_in_parameters_alone_do_not_teach_each_other() {
+        let mut all = samples(false);
+        let own: Vec<Sample> = all.iter().filter(|s| s.scene == "s15").cloned().collect();
+        // Two towns show what no other scene shows, and both mislead: seen one of them, the other would be known.
+        for seed in 1..3 {
+            for mut sample in own.clone() {
+                sample.scene = format!("town(seed={seed})");
+                sample.features.size_spread = 1.0;
+                let ns = sample.ns.get_mut("bounce").unwrap();
+                *ns = 1e4 / *ns;
+                all.push(sample);
+            }
+        }
+        let demand = Demand {
+            rays: 1e6,
+            classes: Vec::new(),
+        };
+        let trials = leave_one_out(&all, &[demand]).unwrap();
+        let of_towns = trials.iter().filter(|t| t.scene.starts_with("town"));
+        let regrets: Vec<f64> = of_towns.map(|t| t.regret).collect();
+        let whole = (3.0_f64 / 9.0).exp2() - 1.0;
+        assert_eq!(regrets.len(), 2);
+        assert!(
+            regrets.iter().all(|regret| (regret - whole).abs() < 1e-6),
+            "{regrets:?}"
+        );
+    }
 }

@@ -89,3 +89,20 @@ pub fn cpu_model() -> String {
     });
     model.unwrap_or(std::env::consts::ARCH).to_owned()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn memory_is_what_the_c_library_says() {
+        let number = |name: &str| -> u64 {
+            let output = std::process::Command::new("getconf").arg(name).output();
+            let text = String::from_utf8(output.unwrap().stdout).unwrap();
+            text.trim().parse().unwrap()
+        };
+        let pages = number("_PHYS_PAGES") * number("PAGESIZE");
+        assert_eq!(memory_bytes(), Some(pages));
+    }
+}

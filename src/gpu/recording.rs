@@ -319,3 +319,18 @@ impl Gpu {
             .download("")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scratch_of_one_name_is_as_long_as_the_longest_that_asks_for_it() {
+        let keys = |bytes| Storage::scratch("keys", bytes);
+        let mut recording = Recording::new();
+        recording.clear(keys(4)).clear(keys(8)).clear(keys(6));
+        recording.clear(Storage::scratch("counts", 2));
+        assert_eq!(recording.scratch_bytes(|_| true), 10);
+        assert_eq!(recording.scratch_bytes(|name| name == "keys"), 8);
+    }
+}

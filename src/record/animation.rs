@@ -75,3 +75,25 @@ impl Cost {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gpu_has_the_time_of_its_passes_and_a_software_adapter_that_of_processors() {
+        let cost = Cost {
+            processor_ms: vec![8.0],
+            wall_ms: vec![4.0],
+            passes_ms: vec![2.0],
+        };
+        assert_eq!([cost.ms(true), cost.ms(false)], [[8.0], [2.0]]);
+        let without = |change: fn(&mut Cost)| {
+            let mut cost = cost.clone();
+            change(&mut cost);
+            [cost.ms(true)[0], cost.ms(false)[0]]
+        };
+        assert_eq!(without(|cost| cost.processor_ms.clear()), [2.0, 2.0]);
+        assert_eq!(without(|cost| cost.passes_ms.clear()), [8.0, 4.0]);
+    }
+}

@@ -255,3 +255,30 @@ impl AddAssign for Tally {
 
 /// Tallies by class.
 pub type Tallies = BTreeMap<u32, Tally>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cycles_of_a_path_are_those_of_all_its_rays() {
+        let at = CoherenceAt {
+            spp: 1,
+            organisation: SINGLE_KERNEL.to_owned(),
+            paths: 6,
+            classes: vec![
+                ("primary".to_owned(), Tally::default()),
+                ("shadow".to_owned(), Tally::default()),
+            ],
+            // Rays and cycles of two groups: the first has four paths, the second two.
+            groups: vec![vec![[4, 100], [2, 50]], vec![[3, 30], [1, 20]]],
+        };
+        let readings = at.readings(128);
+        let mut of_path = readings
+            .iter()
+            .filter(|r| r.figure == figure::CYCLES_PER_PATH.id);
+        let samples = of_path.next().map(|reading| &reading.samples);
+        let expected = Samples::Groups(vec![[130.0, 4.0], [70.0, 2.0]]);
+        assert_eq!(samples, Some(&expected));
+    }
+}

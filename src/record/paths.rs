@@ -76,3 +76,22 @@ impl PathsRecord {
         Verdict::new(self.paths > 0, self.fault.is_some())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_records_together_have_the_paths_of_both_and_the_worst_of_either() {
+        let of = |paths, worst| PathsRecord {
+            paths,
+            worst,
+            median: 0.1 * worst,
+            ..PathsRecord::default()
+        };
+        for (a, b) in [(of(5, 0.5), of(7, 2.0)), (of(7, 2.0), of(5, 0.5))] {
+            let both = a.and(b);
+            assert_eq!((both.paths, both.worst, both.median), (12, 2.0, 0.2));
+        }
+    }
+}

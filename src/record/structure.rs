@@ -431,3 +431,29 @@ impl GateVerdict {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_leaf_is_in_one_class_of_sizes() {
+        let mut record = StructureRecord {
+            build: vec![Phase {
+                name: "whole".to_owned(),
+                ms: 1.0,
+                cpu_ms: None,
+            }],
+            ..StructureRecord::default()
+        };
+        // A leaf of each size from 0 to 20.
+        record.stats.leaf_histogram = vec![1; 21];
+        let shares = record.readings().into_iter();
+        let shares = shares.filter(|r| r.figure == figure::LEAF_SHARE.id);
+        let shares: Vec<f64> = shares.map(|r| 21.0 * r.value.value).collect();
+        let expected = [1.0, 1.0, 1.0, 1.0, 1.0, 4.0, 8.0, 4.0];
+        assert_eq!(shares.len(), expected.len());
+        let near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9;
+        assert!(shares.iter().zip(&expected).all(near), "{shares:?}");
+    }
+}

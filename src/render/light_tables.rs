@@ -288,3 +288,33 @@ fn light_bounds(scene: &SceneData, listed: &ListedLight) -> Option<LightBounds> 
         _ => around,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use raystone_scene::named;
+
+    #[test]
+    fn a_spot_is_bright_in_its_inner_cone_and_fades_up_to_the_outer() {
+        let spot = Light::Spot {
+            position: Vec3::Y,
+            direction: Vec3::NEG_Y,
+            intensity: Vec3::ONE,
+            inner: 0.25,
+            outer: 1.0,
+            decay: true,
+        };
+        let scene = SceneData {
+            lights: vec![spot],
+            ..named("single-triangle").unwrap()
+        };
+        let list = LightList::of(&scene);
+        let mut bounds = list.lights.iter().filter_map(|l| light_bounds(&scene, l));
+        let of_spot = bounds.find(|bounds| bounds.min == DVec3::Y);
+        let of_spot = of_spot.expect("a spot");
+        // As in PBRT v4: the cone of directions is the inner one, and the rest of the outer one is the fall-off.
+        let found = (of_spot.axis, of_spot.normals, of_spot.spread);
+        assert_eq!(found, (DVec3::NEG_Y, 0.25, 0.75));
+    }
+}

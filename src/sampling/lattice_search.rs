@@ -108,3 +108,37 @@ pub(super) fn generating_vector() -> &'static [u32] {
         vector
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The square of the worst-case error of a prefix, by the formula above.
+    fn square(level: u32, vector: &[u32]) -> f64 {
+        let count = 1_u64 << level;
+        let omega = |x: f64| 2.0 * PI * PI * (x * x - x + 1.0 / 6.0);
+        let term = |i: u64| -> f64 {
+            let factors = vector.iter().enumerate().map(|(j, z)| {
+                let place = (i * u64::from(*z) % count) as f64 / count as f64;
+                1.0 + weight(j) * omega(place)
+            });
+            factors.product()
+        };
+        (0..count).map(term).sum::<f64>() / count as f64 - 1.0
+    }
+
+    #[test]
+    fn every_further_digit_of_a_component_is_the_better_of_two() {
+        for level in SEARCH_LEVEL + 1..=LAST_LEVEL {
+            let below = |z: &u32| z & ((1 << level) - 1);
+            let chosen: Vec<u32> = generating_vector()[..3].iter().map(below).collect();
+            for place in 1..3 {
+                let vector = &chosen[..=place];
+                let mut other = vector.to_vec();
+                other[place] ^= 1 << (level - 1);
+                let [chosen, other] = [vector, &other].map(|vector| square(level, vector));
+                assert!(chosen <= other * (1.0 + 1e-6), "{level}: {chosen}, {other}");
+            }
+        }
+    }
+}

@@ -173,6 +173,16 @@ mod tests {
     }
 
     #[test]
+    fn the_square_of_a_noisy_mean_is_not_taken_for_that_of_the_true_mean() {
+        // Of 0, 0, 2 and 2 the mean is 1 and the variance 4/3; the square of the mean is 4/3 / 4 too great on average.
+        let images = [0.0, 0.0, 2.0, 2.0].map(|value| image([1, 1], |_| [value; 3]));
+        let images: Vec<&Image> = images.iter().collect();
+        let found = tile_error(&images, &[0]).expect("four images").log.exp();
+        let expected = 4.0 / 3.0 / (2.0 / 3.0 + RELATIVE_EPSILON);
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found}");
+    }
+
+    #[test]
     fn a_tile_takes_the_fewest_samples_that_are_enough() {
         let exact = LogFigure::exact;
         let counts = [4, 8, 16, 32];

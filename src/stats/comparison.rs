@@ -125,3 +125,25 @@ fn chance_that_less(a: &LogFigure, b: &LogFigure) -> f64 {
 fn is_same(a: &LogFigure, b: &LogFigure) -> bool {
     a == b
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interval::Spread;
+
+    #[test]
+    fn of_many_rivals_one_is_less_by_chance_and_beats_nobody() {
+        // 3 % by chance: the quantile of a normal number is 1.8808.
+        let rival = LogFigure::exact((-0.18808_f64).exp()).with_noise(Some(Spread {
+            variance: 0.01,
+            freedom: f64::INFINITY,
+        }));
+        let place_among = |rivals: usize| {
+            let mut points = vec![[LogFigure::exact(1.0), LogFigure::exact(1.0)]];
+            points.extend((0..rivals).map(|_| [rival.clone(), rival.clone()]));
+            places(&points)[0]
+        };
+        assert_eq!(place_among(1), Place::Beaten);
+        assert_eq!(place_among(5), Place::Open);
+    }
+}

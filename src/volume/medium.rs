@@ -413,4 +413,25 @@ mod tests {
             Vec2::new(0.0, 65504.0)
         );
     }
+
+    #[test]
+    fn with_both_keys_the_extinction_may_vary_by_a_share_of_its_greatest() {
+        let volume = Volume::new([4, 1, 1], |at| {
+            [if at.x < 0.5 { 10.0 } else { 2.0 }, 0.0, 1.0]
+        });
+        let homogeneity = Homogeneity {
+            key: Key::Both,
+            epsilon: 0.25,
+        };
+        let dda = crate::structure::registry();
+        let dda = dda
+            .iter()
+            .next()
+            .expect("a structure")
+            .make(&Default::default());
+        let medium = Medium::new(&volume.unwrap(), dda.unwrap(), homogeneity);
+        let even = |n: [f32; 2], sigma: [f32; 2]| medium.is_homogeneous(n.into(), sigma.into());
+        assert!(even([1.0, 1.25], [7.5, 10.0]) && even([1.0, 1.0], [0.0, 2.5]));
+        assert!(!even([1.0, 1.5], [10.0, 10.0]) && !even([1.0, 1.0], [7.0, 10.0]));
+    }
 }

@@ -278,3 +278,16 @@ pub(crate) fn first_axis(next: [f32; 3], leave: f32) -> usize {
 pub(crate) fn outside(cell: [u32; 3], resolution: [u32; 3]) -> bool {
     (0..3).any(|a| cell[a] >= resolution[a])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_triangle_that_reaches_beyond_a_cell_counts_as_one_across_it() {
+        let cut = |area: f32| Cut::new([1.0, 2.0, 4.0], [area].into_iter(), 64.0);
+        // The largest section of the cell is 2 · 4.
+        assert_eq!(cut(1e6), cut(8.0));
+        assert!(cut(8.0).share < cut(4.0).share);
+    }
+}

@@ -71,3 +71,13 @@ fn validation_finds_planted_faults() {
     plant("cells that lie elsewhere", &|b| b.space.low[0] -= 0.9);
     plant("a box that is too small", &|b| b.space.extent[1] -= 0.5);
 }
+
+#[test]
+fn what_all_parts_of_a_side_would_list_is_not_divided() {
+    // Across the middle of a square: four parts with all twenty cost as much as the whole, and a visit more.
+    let across = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]].map(glam::Vec3::from);
+    let triangles = [across.into(); 20];
+    let params = raystone_core::params::Params::default();
+    let found = crate::known_figures::stats_with("octree", &params, &triangles).unwrap();
+    assert_eq!(found.references, 20);
+}

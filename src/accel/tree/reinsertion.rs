@@ -270,3 +270,86 @@ impl Hierarchy {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raystone_core::random::Pcg32;
+
+    /// A tree over boxes in an order that knows nothing of space, so that most nodes would gain far away.
+    fn careless(random: &mut Pcg32, boxes: usize) -> Hierarchy {
+        let leaves: Vec<Box3> = (0..boxes)
+            .map(|_| {
+                let low = 10.0 * random.in_cube().as_vec3a();
+                let size = random.in_cube().as_vec3a().abs();
+                Box3 {
+                    min: low,
+                    max: low + size,
+                }
+            })
+            .collect();
+        let tree = lay_out(0..boxes, |range, _, order| {
+            let bounds = leaves[range.clone()]
+                .iter()
+                .copied()
+                .fold(Box3::EMPTY, Box3::union);
+            let middle = range.start + range.len().div_ceil(3);
+            if range.len() > 1 {
+                return (
+                    bounds.into(),
+                    Some([range.start..middle, middle..range.end]),
+                );
+            }
+            order.push(range.start as u32);
+            (bounds.into(), None)
+        });
+        Hierarchy::new(&tree)
+    }
+
+    /// The sum of half the areas of all nodes.
+    fn areas(hierarchy: &Hierarchy) -> f64 {
+        let areas = hierarchy
+            .nodes
+            .iter()
+            .map(|n| f64::from(n.bounds.half_area()));
+        areas.sum()
+    }
+
+    #[test]
+    fn the_best_move_spares_as_much_area_as_the_best_of_all_moves_that_are_tried() {
+        let mut random = Pcg32::new(11);
+        for _ in 0..4 {
+            let before = careless(&mut random, 14);
+            for node in 3..before.nodes.len() as u32 {
+                let spared = |target: u32| {
+                    let mut after = Hierarchy {
+                        nodes: before.nodes.clone(),
+                        touched: vec![false; before.nodes.len()],
+                        depth_limit: u32::MAX,
+                    };
+                    let gain = 0.0;
+                    let is_done = after.apply(Move { node, target, gain });
+                    is_done.then(|| areas(&before) - areas(&after))
+                };
+                // Neither beside itself, nor beside a node that holds it: those places are not searched.
+                let holds = |target: u32| {
+                    let mut above = node;
+                    while above != target && above != ROOT {
+                        above = before.node(above).parent;
+                    }
+                    above == target
+                };
+                let targets = 1..before.nodes.len() as u32;
+                let others = targets.filter(|t| *t != sibling(node) && !holds(*t));
+                let most = others.filter_map(spared).fold(0.0, f64::max);
+                let found = before
+                    .best_move(node)
+                    .map_or(0.0, |best| f64::from(best.gain));
+                assert!(
+                    (found - most).abs() < 1e-3 * most.max(1.0),
+                    "{node}: {found}, {most}"
+                );
+            }
+        }
+    }
+}

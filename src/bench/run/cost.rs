@@ -274,6 +274,9 @@ mod tests {
         let seconds = rays / RAYS_PER_SECOND + 3.0 * SECONDS_PER_KERNEL + small.other_s;
         assert!((small.seconds() - seconds).abs() < 1e-9);
         assert!(estimate(&["run.replicates=4"]).rays > small.rays);
+        // A reference that is read is not rendered.
+        let read = estimate(&["reference.file=reference.npy"]);
+        assert!((small.rays - read.rays - 10.0 * 10_000.0).abs() < 1e-6);
         let peers = estimate(&["axes.peer=obvhs-bvh2,obvhs-cwbvh"]);
         assert!((peers.rays - small.rays - 5.0 * 2.0 * 3.0 * 2000.0).abs() < 1e-6);
         let compaction = estimate(&["axes.integrator=compaction:roger"]);

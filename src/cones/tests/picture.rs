@@ -547,6 +547,8 @@ fn crossings_and_budgets_are_those_of_a_hand() {
     assert!((at - 4.0 * 2.0_f64.powf(0.5)).abs() < 1e-9, "{at}");
     let spent = budget(&[1.0, 1.0, 2.0, 4.0], 16);
     assert_eq!(spent, [8, 8, 16, 32]);
+    // Of 1.2, 2.4 and 2.4 samples, what one pixel loses by rounding goes to the next.
+    assert_eq!(budget(&[1.0, 2.0, 2.0], 2), [1, 3, 2]);
     let spent = budget(&[1e-9, 1.0, 1e9, 1e9], 16);
     assert_eq!(spent.iter().sum::<u32>(), 64);
     let triangle = [[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]].map(|p| V3::<f64>::new(p[0], p[1], 1.0));

@@ -222,6 +222,7 @@ fn staircase(axes: &Axes, corners: impl Iterator<Item = Point>) -> Vec<Point> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::drawing::Shape;
     use super::*;
 
     #[test]
@@ -251,5 +252,50 @@ mod tests {
         assert!(open.draw().unwrap().texts().contains(&"1?"));
         assert!(drawing.texts().contains(&"bvh · sobol × none"));
         assert!(!drawing.texts().contains(&"brute-force · sobol × none"));
+    }
+
+    #[test]
+    fn the_grey_band_reaches_as_far_as_the_intervals_of_a_lone_point() {
+        let plot = ParetoPlot {
+            x_title: "seconds".into(),
+            y_title: "relMSE".into(),
+            structures: vec![("bvh".into(), 0)],
+            samplers: vec![("sobol × none".into(), 0)],
+            points: vec![CellPoint {
+                structure: 0,
+                sampler: 0,
+                seconds: Interval {
+                    value: 3.0,
+                    low: 2.0,
+                    high: 5.0,
+                },
+                error: Interval {
+                    value: 0.2,
+                    low: 0.1,
+                    high: 0.3,
+                },
+                place: Place::Front,
+            }],
+        };
+        let shapes = plot.draw().unwrap().shapes;
+        let grey = DIM.with_alpha(0.16);
+        let band = shapes.iter().find_map(|shape| match shape {
+            Shape::Area { points, ink } if *ink == grey => Some(points.clone()),
+            _ => None,
+        });
+        // The whiskers of the point: across and up.
+        let whiskers = shapes.iter().filter_map(|shape| match shape {
+            Shape::Line { points, ink, .. } if ink.alpha == 0.5 => Some(points.clone()),
+            _ => None,
+        });
+        let whiskers: Vec<Vec<Point>> = whiskers.collect();
+        let [across, up] = &whiskers[..] else {
+            panic!("{whiskers:?}")
+        };
+        let band = band.expect("a band");
+        for end in [0, 1] {
+            let corner = (across[end].0, up[end].1);
+            assert!(band.contains(&corner), "{corner:?} in {band:?}");
+        }
     }
 }

@@ -161,6 +161,10 @@ mod tests {
             between.judge(i(f64::NAN, 1.0, 1.1)),
             ClaimVerdict::Undecided
         );
+        let narrow = Bounds::new(Some(0.99), Some(1.1)).and(between);
+        assert_eq!((narrow.least, narrow.most), (0.99, 1.025));
+        let other = between.and(Bounds::new(None, Some(2.0)));
+        assert_eq!((other.least, other.most), (0.975, 1.025));
         let at_most = Bounds::new(None, Some(2.0));
         let words = [at_least, at_most, between, Bounds::new(None, None)].map(Bounds::words);
         assert_eq!(words, ["≥ 1", "≤ 2", "0.975 … 1.025", "anything"]);

@@ -199,3 +199,21 @@ fn a_run_that_went_on_has_only_its_own_end() {
     let complete = ("Every planned cell has figures".to_owned(), Verdict::Fail);
     assert!(open.contains(&complete), "{open:?}");
 }
+
+#[test]
+fn the_first_failures_are_named_and_the_others_counted_without_what_was_left_out() {
+    let mut lines = clean_run();
+    let told = |kind: &str, number: usize| {
+        let record = serde_json::json!({ "kind": kind, "cell": format!("{kind} {number}"), "reason": "no memory" });
+        Line::about_all(serde_json::from_value(record).unwrap())
+    };
+    lines.extend((0..7).map(|number| told("failed", number)));
+    lines.extend((0..3).map(|number| told("skipped", number)));
+    let section = crate::sections::verdict::section(Path::new("nowhere"), &RunData::new(&lines));
+    let text = serde_json::to_string(&section).unwrap();
+    assert!(
+        text.contains("failed 4") && !text.contains("failed 5\""),
+        "{text}"
+    );
+    assert!(text.contains("and 2 more"), "{text}");
+}

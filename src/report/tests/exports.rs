@@ -262,3 +262,25 @@ fn every_cell_that_failed_is_a_test_case_whatever_its_kind() {
     assert!(xml.contains("<failure message=\"no library\">"), "{xml}");
     assert!(!xml.contains("before"), "{xml}");
 }
+
+#[test]
+fn a_change_is_in_the_run_that_shows_it_even_if_the_first_run_lacks_the_figure() {
+    let of_run = |number: u64| {
+        let mut lines = vec![run(), structure("cornell-box", "bvh", 88.0, 0)];
+        lines.truncate(if number == 0 { 1 } else { 2 });
+        for line in &mut lines {
+            match &mut line.body {
+                Body::Run(record) => record.started_unix_s = 100 * number,
+                Body::Structure(record) => record.stats.nodes += u64::from(number >= 2),
+                _ => {}
+            }
+        }
+        (std::path::PathBuf::from(format!("run-{number}")), lines)
+    };
+    let all: Vec<_> = (0..4).map(of_run).collect();
+    let nodes = Selection::new(&["nodes".to_owned()], &[]).unwrap();
+    let history = crate::history::History::new(&all, &nodes).unwrap();
+    let changes = history.series.iter().flat_map(|series| &series.changes);
+    let changes: Vec<usize> = changes.map(|change| change.run).collect();
+    assert_eq!(changes, [2]);
+}

@@ -1,6 +1,7 @@
 //! The page of many devices.
 
 use super::*;
+use crate::document::{Block, Tone};
 use crate::gallery::{Gallery, Offer};
 
 /// Records of a scene with three structures, of which the second fails its gate and the third has none.
@@ -82,6 +83,33 @@ fn a_gallery_has_only_what_passed_and_says_what_it_leaves_out() {
             "{part}"
         );
     }
+}
+
+#[test]
+fn the_structure_of_the_most_rays_per_second_stands_out() {
+    let mut lines = of_device("Alpha", false, 50.0);
+    lines.push(structure("cornell-box", "cwbvh", 70.0, 0));
+    lines.push(structure("cornell-box", "bvh4", 60.0, 0));
+    let document = Gallery::new(&offers(vec![Ok(lines)])).document();
+    let section = document
+        .sections
+        .iter()
+        .find(|s| s.id.starts_with("cornell"));
+    let tables = section
+        .unwrap()
+        .blocks
+        .iter()
+        .filter_map(|block| match block {
+            Block::Table(table) => Some(table),
+            _ => None,
+        });
+    let mut good = Vec::new();
+    for table in tables {
+        let rates = table.columns.iter().zip(&table.rows[0]).skip(3);
+        good.extend(rates.filter(|(_, cell)| cell.tone == Tone::Good));
+    }
+    assert!(!good.is_empty());
+    assert!(good.iter().all(|(column, _)| column.title == "cwbvh"));
 }
 
 #[test]

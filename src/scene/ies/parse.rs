@@ -389,6 +389,11 @@ mod tests {
         let at_45: Vec<f32> = other.candela.chunks(3).map(|c| c[1]).collect();
         assert_eq!(other.horizontal, [0.0, 90.0, 180.0, 270.0, 360.0]);
         assert_eq!(at_45, [2.0, 1.0, 2.0, 3.0, 2.0]);
+        // What is given at 330° and at 90° is a quarter of the way from the first to the second at 0°.
+        let uneven = read("-90 -30 90", "5 4 4 5 2 2 5 6 6");
+        let at_45: Vec<f32> = uneven.candela.chunks(3).map(|c| c[1]).collect();
+        assert_eq!(uneven.horizontal, [0.0, 90.0, 210.0, 270.0, 330.0, 360.0]);
+        assert_eq!(at_45, [3.0, 6.0, 2.0, 4.0, 2.0, 3.0]);
         let open = read("0 90 180 270", "5 1 1 5 2 2 5 3 3 5 4 4");
         assert_eq!((open.horizontal[4], open.candela[13]), (360.0, 1.0));
         assert_eq!(open.warnings.len(), 1);

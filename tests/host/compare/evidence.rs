@@ -414,3 +414,15 @@ fn figures_that_follow_from_others_are_not_compared() {
         assert!(found.findings.iter().all(|f| f.figure.id != id), "{id}");
     }
 }
+
+#[test]
+fn one_pixel_that_is_no_number_makes_a_run_worse() {
+    let found = with(|line| {
+        if let (Body::Error(record), "sequence-2") = (&mut line.body, line.key.label("sequence")) {
+            record.non_finite_pixels = usize::from(record.replicate == 0);
+        }
+    });
+    let worse: Vec<_> = said(&found, "finite/v1").collect();
+    assert_eq!(worse.len(), 1, "{worse:?}");
+    assert_eq!(worse[0].verdict, ChangeVerdict::Worse);
+}

@@ -111,6 +111,24 @@ fn plan(experiment: &Experiment, only: &[&str]) -> Result<Plan, ConfigError> {
 }
 
 #[test]
+fn a_filter_that_leaves_out_what_a_condition_does_leaves_nothing_to_be_told() {
+    let text = AXES.replace(
+        "[\"cornell-box\"]",
+        "[\"cornell-box\", \"displaced-sphere\"]",
+    );
+    let when = "[accel.bvh]\nwhen = { scene = \"displaced-sphere\" }\n";
+    let experiment = parse_with(&(text + when), &[]).unwrap();
+    let told = |only: &[&str]| -> usize {
+        let skipped = plan(&experiment, only).unwrap().skipped;
+        skipped.iter().map(|skipped| skipped.cells).sum()
+    };
+    // Two samplers with the structure in the other scene.
+    assert_eq!(told(&[]), 2);
+    assert_eq!(told(&["sequence=sobol"]), 1);
+    assert_eq!(told(&["scene=displaced-sphere"]), 0);
+}
+
+#[test]
 fn names_with_parameters_are_written_as_reports_write_them() {
     let accels = |overrides: &[&str]| {
         let experiment = parse_with(
