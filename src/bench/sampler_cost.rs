@@ -52,6 +52,12 @@ pub(crate) fn ns_per_draw(ms: f64, pairs: u32, samples: u32) -> f64 {
     ms * 1e6 / (u64::from(PIXELS) * u64::from(pairs) * u64::from(samples)) as f64
 }
 
+/// Nanoseconds per pair of dimensions, of drawing alone and of the loop around it, from the milliseconds of dispatches with draws
+/// and without.
+fn costs([with, without]: [f64; 2], pairs: u32, samples: u32) -> [f64; 2] {
+    [with - without, without].map(|ms| ns_per_draw(ms, pairs, samples))
+}
+
 /// Compares what a dispatch of a loop leaves in some pixels with the loop over the sampler's twin, or over none: one that draws
 /// fewer numbers than are counted looks cheap.
 fn check_sums(
@@ -135,9 +141,9 @@ pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<([Reading; 2], Strin
     for _ in 0..ROUNDS {
         let without = work.run(&empty, samples)?;
         let with = work.run(&drawing, samples)?;
-        let ns = |ms: f64| ns_per_draw(ms, pairs, samples);
-        drawn.push(ns(with - without));
-        looped.push(ns(without));
+        let [draw, turn] = costs([with, without], pairs, samples);
+        drawn.push(draw);
+        looped.push(turn);
     }
     let interval = |values: &[f64]| {
         median_interval(values)
@@ -148,4 +154,20 @@ pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<([Reading; 2], Strin
         Reading::new(&LOOP_NS, interval(&looped)?),
     ];
     Ok((readings, gpu.pipeline(&drawing, true)?.kernel.hash()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cost_of_a_draw_is_without_that_of_the_loop() {
+        // As many pairs as nanoseconds in the difference.
+        let draws = f64::from(PIXELS) * 3.0 * 8.0;
+        let [draw, turn] = costs([5e-6 * draws, 4e-6 * draws], 3, 8);
+        assert!(
+            (draw - 1.0).abs() < 1e-9 && (turn - 4.0).abs() < 1e-9,
+            "{draw} and {turn}"
+        );
+    }
 }

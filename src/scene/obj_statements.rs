@@ -197,6 +197,8 @@ impl Statements {
         }
         let mut position = Vec3::new(x, y, z);
         match count {
+            // Weights are for rational surfaces, whose control points may have none.
+            4 if w == 0.0 => reader.unread.see("a weight of 0 of a vertex", line),
             4 => position /= w,
             6 | 7 => {
                 self.colors.resize(self.positions.len(), None);

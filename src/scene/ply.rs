@@ -473,7 +473,7 @@ fn corner_list(element: &Element) -> Option<usize> {
     let is_whole = |p: &Property| !matches!(p.kind, Kind::Float | Kind::Double);
     let lists = element.properties.iter().enumerate();
     let lists = lists.filter(|(_, p)| p.length.is_some());
-    let named = ["vertex_indices", "vertex_index"];
+    let named = ["vertex_indices", "vertex_index", "vertices"];
     let is_named = |p: &Property| named.iter().any(|name| p.name.eq_ignore_ascii_case(name));
     let mut of_name = lists.clone().filter(|(_, p)| is_named(p));
     let mut whole = lists.filter(|(_, p)| is_whole(p));

@@ -129,6 +129,22 @@ fn the_map_has_a_disc_where_selected_cells_got_their_photons_from() {
     }
     let wide = importance(&adaptive, &lit([10, 4], 3)).unwrap();
     assert!(wide.density(place(13.0, 4.0)) > 1.5 * map.density(place(13.0, 4.0)));
+    // Half of the cells are in shadow, and got their photons from elsewhere.
+    let mut cells = lit([3, 12], 1);
+    for (cell, dark) in cells.iter_mut().zip(lit([12, 3], 1)).step_by(2) {
+        *cell = Pilots {
+            radiance: 0.1,
+            ..dark
+        };
+    }
+    let half = Adaptive {
+        edges: 0.0,
+        shadows: 0.5,
+        ..EVEN
+    };
+    let map = importance(&half, &cells).unwrap();
+    let [bright, dark] = [place(3.0, 12.0), place(12.0, 3.0)].map(|at| map.density(at));
+    assert!(dark > 5.0 * bright, "{dark} and {bright}");
     // Cells in shadow are those with the least light, and a limit is one.
     let shadows = Adaptive {
         edges: 0.0,

@@ -9,6 +9,10 @@ const RED_AND_BLUE: &str = "newmtl red\nKd 0.8 0.1 0.1\nnewmtl blue\nKd 0.1 0.1 
 const OBJ: &[(&str, Outcome)] = &[
     ("mtllib m.mtl\nusemtl\tred\nf 1 2 3 4\n", Reads("rr", &[])),
     (
+        "v 9 9 9 0\nmtllib m.mtl\nusemtl red\nf 1 2 5\n",
+        Reads("r", &["a weight of 0 of a vertex (line 5)"]),
+    ),
+    (
         "mtllib\tm.mtl\nusemtl red\nf\t1\t2  3 4\n",
         Reads("rr", &[]),
     ),

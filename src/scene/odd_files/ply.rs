@@ -113,6 +113,10 @@ const PLY: &[(&str, Outcome)] = &[
         Reads("..", &["`part` of `face`"]),
     ),
     (
+        "V4element face 1\nproperty list uchar int flags\nproperty list uchar int vertices\nE C2 7 7 4 0 1 2 3\n",
+        Reads("..", &["`flags` of `face`"]),
+    ),
+    (
         "V4element face 1\nproperty list uchar float texcoord\nproperty list uchar int corners\nE C1 0.5 4 0 1 2 3\n",
         Reads("..", &["`texcoord` of `face`"]),
     ),
