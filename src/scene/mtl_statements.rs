@@ -165,17 +165,18 @@ impl Definition {
 
     /// Whether the surface itself shows under an illumination model of glass. The models 4 and 9 are those of opaque surfaces
     /// with `d`, and have no transmitted term; exporters write 4 for all surfaces (Maya), 6 and 9 for those whose `d` is
-    /// below 1 (Blender). Metals transmit nothing. Where `d` is 0, glass is all that can be meant.
+    /// below 1 (Blender), 7 without an index (Cinema 4D). Metals transmit nothing. Where `d` is 0, glass is all that can be meant.
     fn shows_its_surface(&self) -> bool {
         let opacity = self.source.opacity.unwrap_or(1.0);
         let is_coloured = self.maps[0].is_some()
             || (self.diffuse).is_some_and(|kd| kd.iter().any(|part| *part > BLACK));
         let is_covered_in_part = 0.0 < opacity && opacity < 1.0 || self.maps[2].is_some();
+        let is_unstated = self.source.ior.is_none() && self.source.filter.is_none();
         let is_metal = self.source.metallic.is_some_and(|metallic| metallic >= 0.5);
         match self.source.illum {
             Some(4 | 9) => is_metal || is_covered_in_part || opacity >= 1.0 && is_coloured,
-            Some(6) => is_metal || is_covered_in_part,
-            Some(7) => is_metal,
+            Some(6) => is_metal || is_covered_in_part || is_coloured && is_unstated,
+            Some(7) => is_metal || is_coloured && is_unstated,
             _ => false,
         }
     }

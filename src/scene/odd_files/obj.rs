@@ -408,10 +408,15 @@ const MTL: &[(&str, Outcome)] = &[
         "newmtl a\nKd 1 0 0\nillum 6\nd 0.9\nPm 1\nPr 0.5",
         Reads("r", &[]),
     ),
+    ("newmtl a\nKd 1 0 0\nillum 7", Reads("r", &[])),
+    (
+        "newmtl a\nKd 1 0 0\nillum 7\nNi 1.5",
+        Reads(".", &["`Kd` of glass (line 1)"]),
+    ),
     ("newmtl a\nKd 1 0 0\nillum 7\nPm 1\nPr 0.5", Reads("r", &[])),
     ("newmtl a\nKd 0 0 0\nillum 9\nNi 1.5", Reads(".", &[])),
     (
-        "newmtl a\nKd 1 0 0\nillum 7\nd 0.5\nPm 0\nPr 0.8",
+        "newmtl a\nKd 1 0 0\nillum 7\nNi 1.5\nd 0.5\nPm 0\nPr 0.8",
         Reads(
             ".",
             &["`Kd` of glass (line 1), `Pr` of glass (line 1), `d` of glass (line 1)"],
@@ -447,8 +452,8 @@ const MTL: &[(&str, Outcome)] = &[
         Reads("r", &[]),
     ),
     (
-        "newmtl a\nillum 7\nnorm t.png\nmap_Kd t.png",
-        Reads(".", &["`map_Kd` of glass or a mirror (line 4)"]),
+        "newmtl a\nillum 7\nNi 1.5\nnorm t.png\nmap_Kd t.png",
+        Reads(".", &["`map_Kd` of glass or a mirror (line 5)"]),
     ),
     (
         "newmtl a\nKd 0.5 0 0\nKs 0.2 0.2 0.2\nillum 2\nPm 0",
