@@ -140,11 +140,14 @@ impl Framing {
     }
 }
 
+/// Smaller scenes are seen from as far as those of this size: squares of areas still are numbers there.
+const SMALLEST: f32 = 1e-10;
+
 /// Centre and radius of a sphere around the box; never of radius zero, even for a point.
 fn sphere_around(bounds: &Bounds) -> (Vec3, f32) {
     let center = bounds.center();
     let least = 1e-3 * center.abs().max_element();
-    (center, bounds.radius().max(least).max(1e-30))
+    (center, bounds.radius().max(least).max(SMALLEST))
 }
 
 fn to_unit(v: Vec3, center: Vec3, radius: f32) -> Vec3 {

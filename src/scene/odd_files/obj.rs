@@ -112,10 +112,7 @@ const OBJ: &[(&str, Outcome)] = &[
     ),
     (
         "v 1 1 1 0\nf 1 2 5\nf 1 2 3\n",
-        Reads(
-            ".",
-            &["1 triangle dropped", "1 vertex is not finite (line 5)"],
-        ),
+        Reads("..", &["a weight of 0 of a vertex (line 5)"]),
     ),
     (
         "v 1 1 1 1 0\nv 1 1 1 x\nv 1 1 1 1 0 0 1 8 9\nf 5 6 7\nf 1 2 3\n",
