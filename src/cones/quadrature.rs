@@ -198,3 +198,31 @@ fn points(place: f64, size: f64) -> impl Iterator<Item = f64> {
     });
     each.filter(|distance| *distance <= 1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The lens of two circles, by the angles of its arcs and the triangles between them.
+    fn lens(a: f64, b: f64, apart: f64) -> f64 {
+        let angle = |own: f64, other: f64| {
+            ((apart * apart + own * own - other * other) / (2.0 * apart * own)).acos()
+        };
+        let sector = |own: f64, other: f64| {
+            let angle = angle(own, other);
+            own * own * (angle - 0.5 * (2.0 * angle).sin())
+        };
+        sector(a, b) + sector(b, a)
+    }
+
+    #[test]
+    fn disks_have_a_lens_in_common() {
+        for (narrow, wide, apart) in [(0.3, 1.0, 0.9), (0.5, 0.5, 0.4), (0.25, 0.75, 0.55)] {
+            let (found, exact) = (common(narrow, wide, apart), lens(narrow, wide, apart));
+            assert!((found - exact).abs() < 2e-4 * exact, "{found} for {exact}");
+        }
+        let inside = common(0.25, 0.75, 0.5);
+        assert!((inside - PI / 16.0).abs() < 1e-6, "{inside}");
+        assert_eq!(common(0.25, 0.5, 0.75), 0.0);
+    }
+}

@@ -249,3 +249,21 @@ pub fn crossing(errors: &[f64], floor: f64) -> Crossing {
     let part = (above - floor.ln()) / (above - below);
     Crossing::At((last as f64 + part).exp2())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_of_the_reference_cancels_in_what_changes() {
+        let truth = |half: f64, other: f64| Truth {
+            halves: [vec![DVec3::splat(half)], vec![DVec3::splat(other)]],
+        };
+        let picture = || vec![DVec3::ONE];
+        let frames = [truth(0.0, 0.0), truth(0.2, -0.2)];
+        let frames = frames.each_ref().map(|truth| (truth, picture()));
+        // About their means the errors are 0.1, -0.1 by one half and -0.1, 0.1 by the other.
+        let found = shimmer(&frames);
+        assert!((found + 0.02).abs() < 1e-12, "{found}");
+    }
+}

@@ -238,6 +238,7 @@ impl Integrator for Path {
 mod tests {
     use super::*;
     use crate::SceneFeatures;
+    use raystone_core::params::ParamValue;
     use std::collections::BTreeSet;
 
     #[test]
@@ -253,6 +254,27 @@ mod tests {
         let alone = |carry: Carry| carry.features().count();
         assert_eq!(alone(Carry::Nothing), 0);
         assert!(Carry::ALL.iter().skip(1).all(|carry| alone(*carry) > 0));
+    }
+
+    #[test]
+    fn rays_that_are_not_traced_are_not_counted() {
+        let word = |name: &str, value: &str| (name.to_owned(), ParamValue::Name(value.to_owned()));
+        let rays = |strategy: Strategy, primary: Primary| {
+            let chosen = [
+                word("strategy", strategy.name()),
+                word("primary", primary.name()),
+            ];
+            Path.facts(&Params(chosen.into())).rays
+        };
+        use CountedRays::{Bounce, Primary as First, Shadow};
+        let traced = Primary::Traced;
+        assert_eq!(rays(Strategy::MisBalance, traced), [First, Shadow, Bounce]);
+        assert_eq!(rays(Strategy::Bsdf, traced), [First, Bounce]);
+        assert_eq!(
+            rays(Strategy::MisBalance, Primary::Raster),
+            [Shadow, Bounce]
+        );
+        assert_eq!(rays(Strategy::Bsdf, Primary::Raster), [Bounce]);
     }
 
     #[test]

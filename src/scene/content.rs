@@ -264,8 +264,8 @@ impl Hash {
 #[cfg(test)]
 mod tests {
     use crate::builtin::tests::load_default;
-    use crate::{Daylight, Light, MIRROR, TextureUse};
-    use glam::Vec3;
+    use crate::{Daylight, Light, MIRROR, TextureUse, Transform};
+    use glam::{Mat4, Vec3, vec3};
 
     #[test]
     fn the_hash_sees_every_part_of_the_scene() {
@@ -318,6 +318,30 @@ mod tests {
         let flattened = &mut scene.triangles[emitters[0] as usize].vertices;
         flattened[2] = flattened[1];
         assert_eq!(scene.emitters(), emitters[1..]);
+    }
+
+    #[test]
+    fn a_copy_is_mirrored_while_its_transform_is() {
+        let mut scene = load_default("instances");
+        let mirror = Mat4::from_scale(vec3(-2.0, 2.0, 2.0));
+        let turn = Mat4::from_rotation_y(1.0);
+        let before = scene.clone();
+        for (step, is_so) in [(mirror, true), (mirror * turn, true), (turn, false)] {
+            scene
+                .move_instance(1, Transform::from_matrix(step))
+                .unwrap();
+            let assembly = scene.assembly.as_ref().unwrap();
+            let moved = &assembly.instances()[1];
+            let own = moved.first as usize..moved.first as usize + assembly.copy(moved).count();
+            for id in 0..scene.triangles.len() {
+                let wanted = if own.contains(&id) {
+                    is_so
+                } else {
+                    before.is_mirrored(id)
+                };
+                assert_eq!(scene.is_mirrored(id), wanted, "triangle {id}");
+            }
+        }
     }
 
     #[test]

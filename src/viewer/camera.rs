@@ -104,6 +104,24 @@ mod tests {
             (turn.target - start.target).dot(right) > 0.0,
             "right is right"
         );
+        let forward = (start.target - start.eye).normalize();
+        for (axis, along) in [right, start.up.normalize(), forward]
+            .into_iter()
+            .enumerate()
+        {
+            let mut step = [0.0; 3];
+            step[axis] = 0.1;
+            let flown = moved(start, Motion::Fly(step));
+            let shift = along * 0.1 * distance(start);
+            assert!(
+                (flown.eye - start.eye - shift).length() < 1e-5,
+                "axis {axis}"
+            );
+            assert!(
+                (flown.target - start.target - shift).length() < 1e-5,
+                "axis {axis}"
+            );
+        }
         let back = moved(
             moved(start, Motion::Fly([0.1, 0.2, 0.3])),
             Motion::Fly([-0.1, -0.2, -0.3]),

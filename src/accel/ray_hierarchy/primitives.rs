@@ -69,7 +69,7 @@ impl Primitive {
     }
 
     /// Distance of the farthest corner of a box from the centre, f64.
-    fn farthest(&self, bounds: &Bounds) -> f64 {
+    pub(super) fn farthest(&self, bounds: &Bounds) -> f64 {
         let reach = |a: usize| {
             let [low, high] = [bounds.min[a], bounds.max[a]];
             let off = |x: f32| (f64::from(x) - f64::from(self.centre[a])).abs();

@@ -4,8 +4,9 @@ use super::enclosing::enclosing;
 use super::node::{
     Bounding, FAR, LEAST_INFLATION, Node, empty_around, meets_ball, meets_box, node_of_ray, pair,
 };
-use super::primitives::Primitives;
+use super::primitives::{Primitive, Primitives};
 use super::{Apex, Bound, Built, Options, Order, RayHierarchy, Union};
+use crate::bounds::Bounds;
 use crate::fixtures::lattice;
 use crate::{BuiltAccel as _, Intersection, Structure as _};
 use glam::{DVec3, Vec3};
@@ -209,6 +210,33 @@ fn no_test_loses_what_a_ray_of_the_node_meets() {
         "{met} {wide} {refused}"
     );
     assert!(lost_as_printed * 2 > wide, "{lost_as_printed} of {wide}");
+}
+
+#[test]
+fn a_primitive_reaches_to_the_farthest_corner_of_a_box() {
+    let primitive = Primitive {
+        centre: [1.0, 2.0, 3.0],
+        radius: 7.0,
+        low: [-1.0; 3],
+        first: 0,
+        high: [9.0; 3],
+        end: 1,
+    };
+    // 2, 3 and 6 from the centre, whose squares sum to 7²; the nearer sides are 1, 0 and 5 off.
+    for far in 0..8 {
+        let mut bounds = Bounds {
+            min: [0.0, 2.0, -2.0],
+            max: [2.0, 2.0, 8.0],
+        };
+        for (axis, reach) in [2.0, 3.0, 6.0].into_iter().enumerate() {
+            if far >> axis & 1 == 0 {
+                bounds.min[axis] = primitive.centre[axis] - reach;
+            } else {
+                bounds.max[axis] = primitive.centre[axis] + reach;
+            }
+        }
+        assert_eq!(primitive.farthest(&bounds), 7.0, "corner {far}");
+    }
 }
 
 #[test]

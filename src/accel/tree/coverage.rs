@@ -246,6 +246,18 @@ mod tests {
         assert_eq!(check(&[whole]), Ok(()));
         assert!(check(&[]).is_err());
         assert!(check(&[whole, slab([5.0; 3], [9.0; 3])]).is_err());
+        // Beside it in one direction only, and touching it.
+        for axis in 0..3 {
+            let mut beside = whole;
+            beside.min[axis] = whole.max[axis].next_up();
+            beside.max[axis] += 1.0;
+            assert!(check(&[whole, beside]).is_err(), "above, axis {axis}");
+            beside.min[axis] = whole.max[axis];
+            assert_eq!(check(&[whole, beside]), Ok(()), "axis {axis}");
+            beside.min[axis] = -1.0;
+            beside.max[axis] = 0.0_f32.next_down();
+            assert!(check(&[whole, beside]).is_err(), "below, axis {axis}");
+        }
         let soup = soup();
         let twice = [soup.records[0]; 2];
         let mut coverage = Coverage::new(&soup, 0);

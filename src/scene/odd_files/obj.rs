@@ -529,6 +529,13 @@ fn several_libraries_stand_in_a_line_and_a_name_with_a_blank_goes_first() {
         b"newmtl red\nKd 0 1 0\nnewmtl blue\nKd 0 1 0\n",
     ));
     check("one", load_files(&files), &Reads("gg", &[]));
+    let model = String::from_utf8_lossy(model).replace("a.mtl b.mtl", "colours b.mtl");
+    let files: [(&str, &[u8]); 3] = [
+        ("a.obj", model.as_bytes()),
+        ("colours", one[0]),
+        ("b.mtl", one[1]),
+    ];
+    check("no ending", load_files(&files), &Reads("rb", &[]));
 }
 
 #[test]

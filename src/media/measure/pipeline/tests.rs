@@ -1,6 +1,6 @@
 //! Faults of the host that a run has to see: flags that are forgotten, and another light or medium than the one judged.
 
-use super::checks::{Judge, truth_of};
+use super::checks::{Judge, errors, truth_of};
 use super::ready::{begun, ran, turn_to};
 use super::scene::{lamp, view};
 use super::*;
@@ -21,6 +21,21 @@ fn fog(side: u32) -> (Volume, Medium) {
         .unwrap();
     let medium = Medium::new(&volume, structure, Homogeneity::default());
     (volume, medium)
+}
+
+#[test]
+fn errors_of_an_image_are_parts_of_its_mean() {
+    let truth = [1.0, 3.0];
+    let intensity = DVec3::new(1.0, 2.0, 3.0);
+    // Off by 1, 2 and 0, and by -3, 0 and 0 of a mean of (6 + 18) / 6 = 4.
+    let image = [Vec3::new(2.0, 4.0, 3.0), Vec3::new(0.0, 6.0, 9.0)];
+    let [rmse, bias] = errors(&truth, intensity, &image);
+    assert!((rmse - (14.0_f64 / 6.0).sqrt() / 4.0).abs() < 1e-12);
+    assert_eq!(bias, 0.0);
+    let image = [Vec3::new(2.0, 4.0, 3.0), Vec3::new(3.0, 6.0, 12.0)];
+    let [rmse, bias] = errors(&truth, intensity, &image);
+    assert!((rmse - (14.0_f64 / 6.0).sqrt() / 4.0).abs() < 1e-12);
+    assert!((bias - 1.0 / 4.0).abs() < 1e-12);
 }
 
 #[test]
