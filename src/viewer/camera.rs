@@ -105,7 +105,7 @@ mod tests {
             "right is right"
         );
         let forward = (start.target - start.eye).normalize();
-        for (axis, along) in [right, start.up.normalize(), forward]
+        for (axis, along) in [right.normalize(), start.up.normalize(), forward]
             .into_iter()
             .enumerate()
         {
