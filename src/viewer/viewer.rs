@@ -231,6 +231,8 @@ impl<'g> Viewer<'g> {
             return Ok(());
         };
         let mut old = std::mem::take(&mut self.sides);
+        // Images of a scene that moved have begun anew.
+        let is_moved = done.iter().any(|done| done.work == Work::Followed);
         for (cell, name) in screen.cells.iter().zip(SIDE_NAMES) {
             let name = if screen.cells.len() > 1 {
                 format!("{name}: ")
@@ -246,7 +248,7 @@ impl<'g> Viewer<'g> {
                 .position(|side| same(side) && side.fault.is_none());
             if let Some(place) = kept {
                 let mut side = old.swap_remove(place);
-                if side.lens == lens {
+                if side.lens == lens && !is_moved {
                     note(done, Work::Kept, format!("{name}image"), Instant::now());
                 } else {
                     side.restart(lens);

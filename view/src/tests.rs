@@ -193,6 +193,7 @@ fn an_object_is_moved_by_numbers() {
     let moved: Vec<u32> = harness.state().screen.dragged.keys().copied().collect();
     assert_eq!(moved, [2]);
     assert!(has(&harness, "object 2 by"));
+    assert!(has(&harness, "samples begun anew") && !has(&harness, "image kept"));
     harness.get_by_label("put objects back").click();
     settle(&mut harness);
     assert!(harness.state().screen.dragged.is_empty());
