@@ -208,6 +208,9 @@ function draw({ figures: known, width, height, picture }) {
   if (picture.length > 0) {
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     canvas.getContext("2d").putImageData(new ImageData(picture, width, height), 0, 0);
+  } else if (known.sides.some(({ fault }) => fault)) {
+    // Nothing comes in place of what was there: a canvas that is given a size is empty.
+    Object.assign(canvas, { width, height });
   }
   const { sides } = known;
   at("swipe-field").hidden = sides.length < 2;
