@@ -390,7 +390,14 @@ mod tests {
 
     #[test]
     fn an_override_without_sense_is_refused_with_its_text() {
-        for text in ["run.seed", "=3", "run.=3", "run.resolution=[64", "a\nb=1", "a'b=1"] {
+        for text in [
+            "run.seed",
+            "=3",
+            "run.=3",
+            "run.resolution=[64",
+            "a\nb=1",
+            "a'b=1",
+        ] {
             let message = parse_override(text).unwrap_err().to_string();
             assert!(message.contains(text), "{message}");
         }
