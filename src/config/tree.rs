@@ -184,9 +184,7 @@ pub(super) fn parse_override(text: &str) -> Result<Table, ConfigError> {
         text: text.to_owned(),
         problem,
     };
-    let (key, value) = text
-        .split_once('=')
-        .ok_or_else(|| fault("no `=` in it".into()))?;
+    let (key, value) = key_and_value(text).ok_or_else(|| fault("no `=` in it".into()))?;
     // A TOML document with this one key handles dots and quotes.
     let document = format!("{} = 0", key.trim());
     let keys = DeTable::parse(&document)
@@ -195,6 +193,31 @@ pub(super) fn parse_override(text: &str) -> Result<Table, ConfigError> {
     let leaf = sole_leaf(&mut table).ok_or_else(|| fault("one key is needed".into()))?;
     leaf.value = parse_override_value(value.trim(), &at).map_err(fault)?;
     Ok(table)
+}
+
+/// What stands before and behind the first `=` that no quotes hold: names of files may have one.
+fn key_and_value(text: &str) -> Option<(&str, &str)> {
+    let (mut quote, mut is_escaped) = (None, false);
+    let is_end = |letter: char| match quote {
+        None => {
+            quote = Some(letter).filter(|letter| ['"', '\''].contains(letter));
+            letter == '='
+        }
+        Some(_) if is_escaped => {
+            is_escaped = false;
+            false
+        }
+        Some(open) => {
+            is_escaped = open == '"' && letter == '\\';
+            quote = quote.filter(|open| *open != letter);
+            false
+        }
+    };
+    match text.find(is_end) {
+        Some(end) => Some((&text[..end], &text[end + 1..])),
+        // A quote that nothing closes.
+        None => text.split_once('='),
+    }
 }
 
 fn parse_override_value(text: &str, at: &Place) -> Result<Value, String> {
@@ -354,16 +377,27 @@ mod tests {
         assert_eq!(items[0].value, Value::Integer(3));
         assert_eq!(items[1].value, Value::Text("eight".into()));
         assert!(matches!(value("a.b=[1,2]"), Value::List(items) if items.len() == 2));
-        let quoted = parse_override("scene.\"x.obj\".n=1").unwrap();
-        assert_eq!(
-            leaf(&quoted, &["scene", "x.obj", "n"]).value,
-            Value::Integer(1)
-        );
+        for (text, name) in [
+            ("scene.\"x.obj\".n=1", "x.obj"),
+            // A name may have what ends keys and quotes.
+            ("scene.\"x=\\\"y.obj\".n=1", "x=\"y.obj"),
+            ("scene.'x=\"y.obj'.n=1", "x=\"y.obj"),
+        ] {
+            let value = leaf(&parse_override(text).unwrap(), &["scene", name, "n"]).value;
+            assert_eq!(value, Value::Integer(1), "{text}");
+        }
     }
 
     #[test]
     fn an_override_without_sense_is_refused_with_its_text() {
-        for text in ["run.seed", "=3", "run.=3", "run.resolution=[64", "a\nb=1"] {
+        for text in [
+            "run.seed",
+            "=3",
+            "run.=3",
+            "run.resolution=[64",
+            "a\nb=1",
+            "a'b=1",
+        ] {
             let message = parse_override(text).unwrap_err().to_string();
             assert!(message.contains(text), "{message}");
         }

@@ -18,6 +18,8 @@ pub enum Work {
     Restarted,
     /// What was there is used further.
     Kept,
+    /// A structure was not built, or its kernels not compiled: the image has the reason in its place.
+    Failed,
 }
 
 /// One thing that was done for a change of the screen.
@@ -46,6 +48,7 @@ impl fmt::Display for Done {
             Work::Compiled => write!(f, "{what} compiled in {took}"),
             Work::Restarted => write!(f, "{what} begun anew"),
             Work::Kept => write!(f, "{what} kept"),
+            Work::Failed => write!(f, "{what} failed after {took}"),
         }
     }
 }

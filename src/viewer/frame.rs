@@ -115,11 +115,20 @@ pub(crate) fn figures(side: &Side, reference: Option<&Reference>) -> Figures {
 }
 
 impl Frame {
-    /// One picture of all sides: each left or right of `swipe`, a share of the width; `None` while one has none.
+    /// One picture of all sides: each left or right of `swipe`, a share of the width; `None` while one has none. Beside another
+    /// image, one that cannot be made is black.
     pub fn picture(&self, size: [u32; 2], swipe: f32) -> Option<Picture> {
-        let pictures: Option<Vec<&Picture>> =
-            self.sides.iter().map(|s| s.picture.as_ref()).collect();
-        let pictures = pictures.filter(|pictures| !pictures.is_empty())?;
+        let black = Picture {
+            width: 1,
+            height: 1,
+            pixels: vec![[0; 3]],
+        };
+        let pictures = self.sides.iter().map(|side| {
+            let absent = side.fault.as_ref().map(|_| &black);
+            side.picture.as_ref().or(absent)
+        });
+        let pictures: Option<Vec<&Picture>> = pictures.collect();
+        let pictures = pictures.filter(|_| self.sides.iter().any(|side| side.picture.is_some()))?;
         let border = match pictures.len() {
             1 => size[0],
             _ => (swipe * size[0] as f32) as u32,
@@ -216,6 +225,11 @@ mod tests {
         };
         assert_eq!([0.0, 0.5, 1.0].map(|s| count(&frame, s)), [0, 24, 48]);
         frame.sides[1].picture = None;
+        assert_eq!(frame.picture([8, 6], 0.5), None);
+        // One that cannot be made leaves the other its place.
+        frame.sides[1].fault = Some("no room".to_owned());
+        assert_eq!([0.0, 0.5, 1.0].map(|s| count(&frame, s)), [0, 24, 48]);
+        frame.sides[0] = frame.sides[1].clone();
         assert_eq!(frame.picture([8, 6], 0.5), None);
         assert_eq!(Frame::default().picture([8, 6], 0.5), None);
         assert!(frame.write_png(Path::new("x.png"), [8, 6], 0.5).is_err());

@@ -212,13 +212,9 @@ impl<'g> Viewer<'g> {
                 Ok,
             );
             followed.extend(structure.as_ref().ok().cloned());
+            let work = of_fault(structure.as_ref().err(), Work::Followed);
             side.follow(structure, clock.elapsed().as_secs_f64() * 1e3);
-            note(
-                done,
-                Work::Followed,
-                side.cell[Axis::Accel].to_string(),
-                clock,
-            );
+            note(done, work, side.cell[Axis::Accel].to_string(), clock);
             lost(self.gpu)?;
         }
         Ok(())
@@ -235,6 +231,8 @@ impl<'g> Viewer<'g> {
             return Ok(());
         };
         let mut old = std::mem::take(&mut self.sides);
+        // Images of a scene that moved have begun anew.
+        let is_moved = done.iter().any(|done| done.work == Work::Followed);
         for (cell, name) in screen.cells.iter().zip(SIDE_NAMES) {
             let name = if screen.cells.len() > 1 {
                 format!("{name}: ")
@@ -250,7 +248,7 @@ impl<'g> Viewer<'g> {
                 .position(|side| same(side) && side.fault.is_none());
             if let Some(place) = kept {
                 let mut side = old.swap_remove(place);
-                if side.lens == lens {
+                if side.lens == lens && !is_moved {
                     note(done, Work::Kept, format!("{name}image"), Instant::now());
                 } else {
                     side.restart(lens);
@@ -274,20 +272,20 @@ impl<'g> Viewer<'g> {
                 None => {
                     tell(&format!("{name}building {accel}"));
                     let built = world.build(&self.registries, cell);
-                    note(done, Work::Built, format!("{name}{accel}"), clock);
+                    let work = of_fault(built.as_ref().err(), Work::Built);
+                    note(done, work, format!("{name}{accel}"), clock);
                     built
                 }
             };
-            tell(&format!("{name}compiling {}", cell[Axis::Integrator]));
-            let clock = Instant::now();
             let mut side = Side::new(self.gpu, cell, structure, lens);
-            side.compile((&self.registries, world));
-            note(
-                done,
-                Work::Compiled,
-                format!("{name}{}", cell[Axis::Integrator]),
-                clock,
-            );
+            if side.fault.is_none() {
+                let what = format!("{name}{}", cell[Axis::Integrator]);
+                tell(&format!("{name}compiling {}", cell[Axis::Integrator]));
+                let clock = Instant::now();
+                side.compile((&self.registries, world));
+                let work = of_fault(side.fault.as_ref(), Work::Compiled);
+                note(done, work, what, clock);
+            }
             self.sides.push(side);
             lost(self.gpu)?;
         }
@@ -495,6 +493,11 @@ fn known_structure<'a, 'g: 'a>(
 ) -> Option<Structure> {
     let wanted = cell.on(&Cell::STRUCTURE);
     sides.find_map(|side| side.structure.clone().filter(|known| known.cell == wanted))
+}
+
+/// What was done where there is no fault.
+fn of_fault(fault: Option<&String>, work: Work) -> Work {
+    fault.map_or(work, |_| Work::Failed)
 }
 
 /// An error if the device is lost.

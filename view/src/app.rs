@@ -1,6 +1,6 @@
 //! The window: panels around the images, and keys.
 
-use crate::choices;
+use crate::choices::{self, slider};
 use crate::figures;
 use crate::image::ImageView;
 use crate::motion;
@@ -16,10 +16,14 @@ use raystone_core::params::Choice as _;
 use raystone_viewer::Screen;
 use std::path::{Path, PathBuf};
 
-/// Greatest texture of every adapter, pixels.
+/// Greatest texture of every adapter, pixels: beyond it, pictures leave out rows and columns.
 const MOST_PIXELS: u32 = 2048;
+/// The least and the greatest exposure of an experiment, stops.
+const EXPOSURES: [f32; 2] = [-20.0, 20.0];
 /// Widths of a window from which the panels, left and right, are open, points.
 const WIDTHS: [f32; 2] = [700.0, 1000.0];
+/// Height that all keys fit into, points.
+const HELP: f32 = 500.0;
 /// What the keys do.
 const KEYS: [(&str, &str); 19] = [
     ("drag, arrow keys", "orbit around the target"),
@@ -62,6 +66,8 @@ pub struct App {
     /// Whether the panels, left and right, are open; `None` until the user says so.
     are_open: [Option<bool>; 2],
     is_help_open: bool,
+    /// Heights of the panels above and below, points.
+    heights: [f32; 2],
     /// When a window with a display was drawn, for a second; empty without a display.
     drawn: History<()>,
 }
@@ -82,6 +88,7 @@ impl App {
             message: None,
             are_open: [None; 2],
             is_help_open: false,
+            heights: [0.0; 2],
             drawn: History::new(0..1000, 1.0),
         }
     }
@@ -99,8 +106,14 @@ impl App {
         self.message = message.or(self.message.take());
         self.take_dropped(ui);
         self.take_keys(ui);
-        egui::Panel::top("top").show(ui, |ui| self.draw_top(ui));
-        egui::Panel::bottom("bottom").show(ui, |ui| self.draw_bottom(ui));
+        let top = egui::Panel::top("top").show(ui, |ui| self.draw_top(ui));
+        let bottom = egui::Panel::bottom("bottom").show(ui, |ui| self.draw_bottom(ui));
+        let heights = [top, bottom].map(|panel| panel.response.rect.height());
+        if self.heights != heights {
+            // Their lines were cut at the heights of before.
+            ui.ctx().request_discard("panels of other heights");
+            self.heights = heights;
+        }
         let [has_choices, has_figures] = [0, 1].map(|panel| self.is_open(ui, panel));
         if has_choices {
             let most = 0.4 * ui.available_width();
@@ -247,6 +260,8 @@ impl App {
             ui.horizontal(|ui| {
                 for edge in &mut self.screen.size {
                     let value = egui::DragValue::new(edge).range(16..=MOST_PIXELS);
+                    // That of an experiment stays as it is.
+                    let value = value.clamp_existing_to_range(false);
                     ui.add(value.update_while_editing(false))
                         .labelled_by(label.id);
                 }
@@ -291,7 +306,7 @@ impl App {
     fn draw_shown(&mut self, ui: &mut Ui) {
         let is_split = self.screen.cells.len() > 1;
         let window = &mut self.screen.window;
-        ui.add(egui::Slider::new(&mut window.exposure, -8.0..=8.0).text("exposure, stops"));
+        ui.add(slider(&mut window.exposure, -8.0..=8.0).text("exposure, stops"));
         egui::ComboBox::from_label("map of the pixels")
             .selected_text(window.map.name())
             .show_ui(ui, |ui| {
@@ -300,10 +315,10 @@ impl App {
                 }
             });
         if window.map != Map::None {
-            ui.add(egui::Slider::new(&mut window.scale, 0.0..=500.0).text("upper end, 0: 99 %"));
+            ui.add(slider(&mut window.scale, 0.0..=500.0).text("upper end, 0: 99 %"));
         }
         if is_split {
-            ui.add(egui::Slider::new(&mut window.swipe, 0.0..=1.0).text("where A and B meet"));
+            ui.add(slider(&mut window.swipe, 0.0..=1.0).text("where A and B meet"));
             ui.horizontal(|ui| {
                 ui.label("A and B have the same");
                 for pace in Pace::ALL {
@@ -322,6 +337,7 @@ impl App {
             .open(&mut self.is_help_open)
             .resizable(false)
             .vscroll(true)
+            .default_height(HELP)
             .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
             .show(ui.ctx(), |ui| {
                 egui::Grid::new("keys")
@@ -382,23 +398,17 @@ impl App {
         if ui.ctx().text_edit_focused() {
             return;
         }
+        // Where the window is drawn a few times a second, a key is pressed more often than it is looked for.
+        let times = |key| ui.input_mut(|i| i.count_and_consume_key(Modifiers::NONE, key));
         let window = &mut self.screen.window;
-        if pressed(Modifiers::NONE, Key::M) {
-            let place = Map::ALL
-                .iter()
-                .position(|map| *map == window.map)
-                .unwrap_or(0);
-            window.map = Map::ALL[(place + 1) % Map::ALL.len()];
-        }
+        let place = Map::ALL.iter().position(|map| *map == window.map);
+        window.map = Map::ALL[(place.unwrap_or(0) + times(Key::M)) % Map::ALL.len()];
         for (key, by) in [(Key::OpenBracket, -0.05), (Key::CloseBracket, 0.05)] {
-            if pressed(Modifiers::NONE, key) {
-                window.swipe = (window.swipe + by).clamp(0.0, 1.0);
-            }
+            window.swipe = (window.swipe + by * times(key) as f32).clamp(0.0, 1.0);
         }
+        let [least, most] = EXPOSURES;
         for (key, stops) in [(Key::Plus, 0.5), (Key::Equals, 0.5), (Key::Minus, -0.5)] {
-            if pressed(Modifiers::NONE, key) {
-                window.exposure = (window.exposure + stops).clamp(-8.0, 8.0);
-            }
+            window.exposure = (window.exposure + stops * times(key) as f32).clamp(least, most);
         }
         if pressed(Modifiers::NONE, Key::B) {
             let is_split = self.screen.cells.len() > 1;

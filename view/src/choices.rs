@@ -1,10 +1,12 @@
 //! What the images are made of: a choice for each axis, with the parameters that its registry declares.
 
 use eframe::egui;
-use egui::{ComboBox, DragValue, InnerResponse, TextEdit, Ui};
+use egui::emath::Numeric;
+use egui::{ComboBox, DragValue, InnerResponse, Slider, SliderClamping, TextEdit, Ui};
 use raystone_config::{Axis, COMPACTIONS, Catalogue, STRESS};
 use raystone_core::params::{Entry, ParamRange, ParamValue, Parameter, Variant};
 use raystone_viewer::{SIDE_NAMES, Screen};
+use std::ops::RangeInclusive;
 
 /// Axes that A and B share.
 const OF_BOTH: [Axis; 3] = [Axis::Scene, Axis::Triangle, Axis::BoxTest];
@@ -107,6 +109,11 @@ fn shortened(text: &str) -> String {
         None => text.to_owned(),
         Some((end, _)) => format!("{}…", &text[..end]),
     }
+}
+
+/// A slider that leaves a value beyond its ends as it is until it is moved: an experiment may have others.
+pub fn slider<N: Numeric>(value: &mut N, range: RangeInclusive<N>) -> Slider<'_> {
+    Slider::new(value, range).clamping(SliderClamping::Edits)
 }
 
 /// A field for a text, and what was entered where that is another one: half a name is none yet.

@@ -29,18 +29,25 @@ pub fn draw(ui: &mut Ui, frame: &Frame, adapter: &str, screen: &Screen) {
         if let Some(fault) = &side.fault {
             ui.label(RichText::new(fault).color(warning(ui)));
         }
+        // One that could not be made has no samples to come.
+        if side.fault.is_none() || side.figures.spp > 0 {
+            draw_progress(ui, &side.figures);
+        }
         draw_side(ui, name, &side.figures, frame.reference_spp);
     }
     ui.separator();
 }
 
-fn draw_side(ui: &mut Ui, name: &str, figures: &Figures, reference_spp: Option<u32>) {
+fn draw_progress(ui: &mut Ui, figures: &Figures) {
     let share = figures.spp as f32 / figures.of.max(1) as f32;
     let text = match figures.spp {
         0 => "coarse image".to_owned(),
         spp => format!("{spp} of {} spp", figures.of),
     };
     ui.add(ProgressBar::new(share).text(text));
+}
+
+fn draw_side(ui: &mut Ui, name: &str, figures: &Figures, reference_spp: Option<u32>) {
     Grid::new(("figures", name)).num_columns(2).show(ui, |ui| {
         let mut row = |what: &str, value: String| {
             ui.label(what);

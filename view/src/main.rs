@@ -54,7 +54,7 @@ struct Arguments {
     #[arg(long)]
     allow_outside: bool,
     /// Open no window: draw it into this PNG file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = parse_png)]
     screenshot: Option<PathBuf>,
     /// Samples per pixel before the screenshot
     #[arg(long, value_name = "N", default_value_t = 16, requires = "screenshot")]
@@ -115,6 +115,16 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
         let (least, most) = (EDGES.start(), EDGES.end());
         format!("must be width x height, each from {least} to {most}, for instance 1280x800")
     })
+}
+
+fn parse_png(text: &str) -> Result<PathBuf, String> {
+    let file = PathBuf::from(text);
+    let ending = file.extension().unwrap_or_default();
+    if ending.eq_ignore_ascii_case("png") {
+        Ok(file)
+    } else {
+        Err("the picture is a PNG file: its name must end in .png".to_owned())
+    }
 }
 
 fn main() -> ExitCode {

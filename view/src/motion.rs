@@ -1,7 +1,8 @@
 //! How the scene moves: an animation, objects that were dragged, and how structures follow.
 
+use crate::choices::slider;
 use eframe::egui;
-use egui::{ComboBox, DragValue, Slider, Ui};
+use egui::{ComboBox, DragValue, Ui};
 use raystone_config::{Animation, Motion};
 use raystone_core::params::Choice;
 use raystone_viewer::Screen;
@@ -59,11 +60,11 @@ fn draw_animation(ui: &mut Ui, screen: &mut Screen, frame: u32) {
         return;
     };
     choice(ui, "moves", &mut animation.motion);
-    ui.add(Slider::new(&mut animation.amplitude, 0.0..=0.5).text("amplitude, radii"));
+    ui.add(slider(&mut animation.amplitude, 0.0..=0.5).text("amplitude, radii"));
     if animation.motion == Motion::Deform {
-        ui.add(Slider::new(&mut animation.wavelength, 0.1..=4.0).text("wavelength, radii"));
+        ui.add(slider(&mut animation.wavelength, 0.1..=4.0).text("wavelength, radii"));
     }
-    ui.add(Slider::new(&mut animation.frames, 2..=256).text("frames"));
+    ui.add(slider(&mut animation.frames, 2..=256).text("frames"));
     let last = animation.frames - 1;
     ui.horizontal(|ui| {
         let text = if plays { "stop" } else { "play" };
@@ -71,10 +72,7 @@ fn draw_animation(ui: &mut Ui, screen: &mut Screen, frame: u32) {
             play(screen, frame);
         }
         let mut shown = frame.min(last);
-        if ui
-            .add(Slider::new(&mut shown, 0..=last).text("frame"))
-            .changed()
-        {
+        if ui.add(slider(&mut shown, 0..=last).text("frame")).changed() {
             screen.window.frame = shown;
         }
     });

@@ -9,8 +9,8 @@ use raystone_core::params::Choice as _;
 use raystone_viewer::Work;
 use screenshot::{settled, wait};
 
-/// A window of small images, with so many samples.
-fn window(arguments: &[&str], frames: u32) -> Harness<'static, App> {
+/// What a window of small images is to show.
+fn asked(arguments: &[&str]) -> Screen {
     let fixed = [
         "view",
         "--set",
@@ -19,9 +19,14 @@ fn window(arguments: &[&str], frames: u32) -> Harness<'static, App> {
         "run.spp=[4]",
     ];
     let arguments = Arguments::parse_from(fixed.iter().chain(arguments));
-    let screen = arguments.screen().unwrap();
+    arguments.screen().unwrap()
+}
+
+/// A window of small images, with so many samples.
+fn window(arguments: &[&str], frames: u32) -> Harness<'static, App> {
     let worker = Worker::start(AdapterChoice::Best, false, || ());
-    settled(App::new(worker, screen), frames, [1280, 1000]).unwrap()
+    let app = App::new(worker, asked(arguments));
+    settled(app, frames, [1280, 1000]).unwrap()
 }
 
 /// Whether a text is on screen.
@@ -188,6 +193,7 @@ fn an_object_is_moved_by_numbers() {
     let moved: Vec<u32> = harness.state().screen.dragged.keys().copied().collect();
     assert_eq!(moved, [2]);
     assert!(has(&harness, "object 2 by"));
+    assert!(has(&harness, "samples begun anew") && !has(&harness, "image kept"));
     harness.get_by_label("put objects back").click();
     settle(&mut harness);
     assert!(harness.state().screen.dragged.is_empty());
@@ -306,6 +312,8 @@ fn two_names_on_an_axis_make_two_images_and_more_than_the_axis_has_is_an_error()
     );
     assert_eq!(screen(&[]).unwrap().cells.len(), 1);
     assert!(screen(&["--accel", "bhv"]).unwrap_err().contains("bvh"));
+    let picture = |file| Arguments::try_parse_from(["view", "--screenshot", file]);
+    assert!(picture("x.PNG").is_ok() && picture("x.txt").is_err() && picture("png").is_err());
     assert!(
         screen(&["--experiment", "no/such.toml"])
             .unwrap_err()
@@ -401,4 +409,58 @@ fn a_scene_with_a_long_parameter_leaves_the_image_its_place() {
     let harness = window(&["--experiment", &file.path().display().to_string()], 1);
     let list = harness.get_all_by_role(Role::ComboBox).next().unwrap();
     assert!(list.rect().width() < 260.0, "{:?}", list.rect());
+}
+
+#[test]
+fn values_beyond_the_sliders_stay_until_they_are_changed() {
+    let set = [
+        "run.resolution=[2100,16]",
+        "animation.frames=500",
+        "animation.amplitude=2.0",
+        "animation.wavelength=20.0",
+        "window.exposure=10.0",
+        "window.map=\"nodes\"",
+        "window.scale=1000.0",
+    ];
+    let set: Vec<&str> = set.iter().flat_map(|set| ["--set", set]).collect();
+    let mut harness = window(&set, 1);
+    assert_eq!(harness.state().screen, asked(&set));
+    // Twice before the window is drawn again.
+    for is_down in [true, false, true, false] {
+        harness.event(egui::Event::Key {
+            key: egui::Key::Plus,
+            physical_key: None,
+            pressed: is_down,
+            repeat: false,
+            modifiers: egui::Modifiers::NONE,
+        });
+    }
+    settle(&mut harness);
+    assert_eq!(harness.state().screen.window.exposure, 11.0);
+}
+
+#[test]
+fn a_narrower_window_is_whole_when_it_is_drawn_once() {
+    let mut harness = window(&[], 4);
+    rest(&mut harness);
+    let pixels = |harness: &mut Harness<'_, App>| harness.render().unwrap().into_raw();
+    let wide = pixels(&mut harness);
+    harness.set_size(egui::vec2(420.0, 500.0));
+    harness.run_steps(1);
+    let once = pixels(&mut harness);
+    harness.run_steps(3);
+    assert!(once == pixels(&mut harness), "lines are cut");
+    assert_ne!(once.len(), wide.len());
+}
+
+#[test]
+fn an_image_that_cannot_be_made_says_so_and_nothing_else_does() {
+    let scene = "displaced-sphere(triangles=100000)";
+    let arguments = ["--scene", scene, "--accel", "uniform-grid(lambda=1000)"];
+    let harness = window(&arguments, 1);
+    assert!(has(&harness, "cells of a uniform-grid"));
+    assert!(has(&harness, "uniform-grid(lambda=1000) failed after"));
+    for untrue in ["built in", "compiled in", "coarse image"] {
+        assert!(!has(&harness, untrue), "{untrue}");
+    }
 }

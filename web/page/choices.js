@@ -47,7 +47,7 @@ function parameterField(axis, { name, description, default: initial, range }, ch
   } else if (range.text) {
     input = element("input", { id, type: "text", required: range.text === "filled", autocomplete: "off", spellcheck: false, value: initial });
   } else {
-    input = element("input", { id, type: "number", min: range.min, max: range.max, step: range.step, value: initial });
+    input = element("input", { id, type: "number", required: true, min: range.min, max: range.max, step: range.step, value: initial });
   }
   input.title = description;
   input.dataset.parameter = name;
@@ -90,7 +90,8 @@ export function overridesOf(axis, side) {
   const inputs = [...select.parentElement.querySelectorAll("[data-parameter]")];
   const value = (input) => {
     if (input.type === "checkbox") return String(input.checked);
-    return input.type === "number" ? input.value : JSON.stringify(input.value);
+    // As TOML writes it: `.5` is none of its numbers.
+    return input.type === "number" ? String(input.valueAsNumber) : JSON.stringify(input.value);
   };
   const isChanged = (input) => String(input.type === "checkbox" ? input.checked : input.value) !== input.dataset.initial;
   const changed = inputs.filter((input) => isChanged(input) && input.checkValidity());

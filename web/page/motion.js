@@ -100,7 +100,7 @@ function showNumber() {
 export function motionOverrides() {
   const of = at("motion-of").value;
   if (of === "") return [];
-  const value = (id) => at(`motion-${id}`).value;
+  const value = (id) => at(`motion-${id}`).valueAsNumber;
   return [
     `animation.motion=${JSON.stringify(of)}`,
     `animation.frames=${value("frames")}`,
@@ -109,7 +109,7 @@ export function motionOverrides() {
     `window.play=${plays}`,
     `window.frame=${value("frame")}`,
     `window.frame_spp=${value("frame-spp")}`,
-    `window.follow=${JSON.stringify(value("follow"))}`,
+    `window.follow=${JSON.stringify(at("motion-follow").value)}`,
   ];
 }
 

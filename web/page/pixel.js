@@ -83,7 +83,9 @@ export function refresh(isLast = false) {
   if (!pixel || !(isStale || isLast)) return;
   if (pixel.some((place, axis) => place >= size[axis])) {
     pixel = null;
+    ["pixel-x", "pixel-y"].forEach((id, axis) => { at(id).value = Math.min(number(id), size[axis] - 1); });
     forget();
+    askPoints();
     return mark();
   }
   isStale = false;

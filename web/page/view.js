@@ -127,11 +127,21 @@ function adoptScreen({ shown, models }) {
   }
   offer(at("size"), shown.size.join(), shown.size.join(" × "));
   offer(at("spp"), String(shown.spp));
-  for (const [id, value] of [["size", shown.size.join()], ["spp", shown.spp], ["map", shown.map], ["exposure", shown.exposure], ["swipe", shown.swipe]]) at(id).value = value;
+  for (const [id, value] of [["size", shown.size.join()], ["spp", shown.spp], ["map", shown.map]]) at(id).value = value;
+  for (const id of ["exposure", "swipe"]) adoptRange(at(id), shown[id]);
   at("error").checked = shown.error;
   adoptMotion(shown);
   showSides();
   enable(true);
+}
+
+// A range takes what is on screen, also beyond its ends and between its steps: else the next change would round it.
+function adoptRange(range, value) {
+  [range.min, range.max] = [Math.min(range.min, value), Math.max(range.max, value)];
+  range.value = value;
+  if (Number(range.value) === value) return;
+  range.step = "any";
+  range.value = value;
 }
 
 // Only on this server, and once.
@@ -198,6 +208,9 @@ function draw({ figures: known, width, height, picture }) {
   if (picture.length > 0) {
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     canvas.getContext("2d").putImageData(new ImageData(picture, width, height), 0, 0);
+  } else if (known.sides.some(({ fault }) => fault)) {
+    // Nothing comes in place of what was there: a canvas that is given a size is empty.
+    Object.assign(canvas, { width, height });
   }
   const { sides } = known;
   at("swipe-field").hidden = sides.length < 2;
@@ -210,7 +223,7 @@ function draw({ figures: known, width, height, picture }) {
   marks({ size: [width, height], trail: known.trail, sides: sides.length, samples: Number(at("spp").value), swipe: Number(at("swipe").value) });
   const rows = [
     ...timesOf(known.times),
-    ["samples a pixel", (side) => (side.spp ? `${side.spp} of ${side.of}` : "coarse")],
+    ["samples a pixel", (side) => (side.spp ? `${side.spp} of ${side.of}` : side.fault ? "–" : "coarse")],
     ["ms a sample", (side) => digits(side.sample_ms)],
     ["Mrays/s", (side) => digits(side.mrays_s)],
     ...sides[0].rays.map(([name], index) => [`${name} rays a sample`, (side) => raysOf(side.rays[index])]),

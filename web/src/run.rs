@@ -61,7 +61,6 @@ pub async fn run(host: &impl Host, overrides: &[String], only: &[String]) -> Res
     let registries = Registries::default();
     let (experiment, plan) = plan(&registries, overrides, only)?;
     let start = Instant::now();
-    let text = |e: GpuError| e.to_string();
     let mut device = Device::open(host, &registries)
         .await
         .map_err(|error| no_device(&error))?;

@@ -178,7 +178,8 @@ async function move() {
   at("canvas").focus();
   type("motion-frames", 8);
   type("motion-of", "deform");
-  type("motion-amplitude", 0.3);
+  // As a field takes it, and TOML does not.
+  type("motion-amplitude", ".3");
   press(" ");
   await wait("frames", () => figure("frames a second") && Number(at("motion-frame").value) >= 2);
   press(" ");
@@ -239,7 +240,7 @@ async function visit() {
   await drag();
   drop(["study.toml", "room/room.obj"]);
   await wait("the experiment", () => at("split").checked && isFinished(2));
-  seen.controls = ["scene", "accel-a", "accel-a-leaf_size", "accel-b", "size", "spp", "map"].map((id) => at(id)?.value);
+  seen.controls = ["scene", "accel-a", "accel-a-leaf_size", "accel-b", "size", "spp", "map", "exposure"].map((id) => at(id)?.value);
   seen.faults = at("faults").textContent;
   at("split").click();
   await wait("one image", () => rows("figures")["samples a pixel"]?.length === 1 && isFinished(2));

@@ -38,6 +38,7 @@ sequence = [\"sobol\"]
 leaf_size = 3
 [window]
 map = \"nodes\"
+exposure = 7.3
 ";
 
 /// A square of two triangles, red, with a camera and a lamp: the host computes nothing for them.
@@ -307,7 +308,8 @@ fn the_web_page_shows_what_a_visitor_opens_and_inspects() {
     assert_eq!(differing(&still, &glb), [0, 0]);
     assert_eq!(differing(&refitted, &rebuilt), [0, 0]);
     assert!(seen["frame"].as_u64() >= Some(2) && differing(&refitted, &still)[1] > 0);
-    let controls = json!(["room.obj", "bvh", "3", "kd-tree", "40,30", "2", "nodes"]);
+    // The exposure lies beyond the slider, and between two of its steps.
+    let controls = json!(["room.obj", "bvh", "3", "kd-tree", "40,30", "2", "nodes", "7.3"]);
     assert_eq!(seen["controls"], controls);
     assert_eq!(seen["faults"], "");
     check_choices(&seen, &folder.path().join("quad.glb"));
