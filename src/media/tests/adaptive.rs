@@ -62,7 +62,8 @@ fn photons_by_a_constant_importance_are_those_of_the_reference() {
 #[test]
 fn a_filter_keeps_even_light_and_a_wider_one_spreads_a_voxel_further() {
     let Some(gpu) = adapter() else { return };
-    let volume = fog([16; 3]);
+    // No side is another: voxels are counted along each.
+    let volume = fog([16, 20, 12]);
     let medium = medium(&volume, "level-map");
     let adding = Adding::new(Strategy::Fixed64, 0);
     let set = points(Points::Hammersley, 128, 0);
