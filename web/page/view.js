@@ -136,7 +136,9 @@ function adoptScreen({ shown, models }) {
 }
 
 // A range takes what is on screen, also beyond its ends and between its steps: else the next change would round it.
-function adoptRange(range, value) {
+function adoptRange(range, shown) {
+  // Of f32, as it was written.
+  const value = Number(shown.toPrecision(7));
   [range.min, range.max] = [Math.min(range.min, value), Math.max(range.max, value)];
   range.value = value;
   if (Number(range.value) === value) return;
