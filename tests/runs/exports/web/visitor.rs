@@ -309,7 +309,9 @@ fn the_web_page_shows_what_a_visitor_opens_and_inspects() {
     assert_eq!(differing(&refitted, &rebuilt), [0, 0]);
     assert!(seen["frame"].as_u64() >= Some(2) && differing(&refitted, &still)[1] > 0);
     // The exposure lies beyond the slider, and between two of its steps.
-    let controls = json!(["room.obj", "bvh", "3", "kd-tree", "40,30", "2", "nodes", "7.3"]);
+    let controls = json!([
+        "room.obj", "bvh", "3", "kd-tree", "40,30", "2", "nodes", "7.3"
+    ]);
     assert_eq!(seen["controls"], controls);
     assert_eq!(seen["faults"], "");
     check_choices(&seen, &folder.path().join("quad.glb"));
