@@ -152,7 +152,7 @@ fn an_object_is_grasped_moved_and_put_back() {
     // Out of sight: another object, or none, is at its pixel.
     now.dragged.insert(grasp.instance, glam::Vec3::splat(1e3));
     let done = works(&show(&mut viewer, now.clone()));
-    assert_eq!(done, [Work::Followed, Work::Kept]);
+    assert_eq!(done, [Work::Followed, Work::Restarted]);
     assert!(image(&mut viewer) != still);
     let behind = viewer.grasp(pixel).unwrap();
     assert_ne!(behind.map(|g| g.instance), Some(grasp.instance));
