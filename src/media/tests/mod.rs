@@ -19,6 +19,19 @@ mod voxels;
 use crate::medium::{Homogeneity, Key, Medium};
 use crate::{Volume, procedures, structure};
 
+/// Triangles of a box, which turn outwards; corner `k` lies at the far end of axis `a` where bit `a` of `k` is set.
+pub(crate) fn box_triangles() -> impl Iterator<Item = [u32; 3]> {
+    let faces = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+    (faces.into_iter()).flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
+}
+
 /// Volumes of awkward sizes with every kind of content.
 fn volumes() -> Vec<Volume> {
     let mut flat = procedures::cloud(20).unwrap();

@@ -1,5 +1,6 @@
 //! Closed meshes as voxels, against generalised winding numbers in f64 (Jacobson et al. 2013) and closed forms.
 
+use super::box_triangles;
 use super::segments::adapter;
 use super::tier::faults_in_turn;
 use crate::voxels::{Counted, Mesh, VoxelError, coverage, covered};
@@ -254,20 +255,9 @@ fn a_box_off_the_origin_has_the_area_and_volume_of_its_sides() {
         let side = |axis: usize| f64::from(k >> axis & 1) * sides[axis];
         DVec3::new(7.0 + side(0), side(1) - 11.0, side(2))
     };
-    // Two triangles of each face, which turn outwards.
-    let faces = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
     let mesh = Mesh {
         positions: (0..8).map(corner).collect(),
-        triangles: (faces.iter())
-            .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
-            .collect(),
+        triangles: box_triangles().collect(),
     };
     assert!((mesh.area() - 62.0).abs() < 1e-9, "{}", mesh.area());
     assert!((mesh.volume() - 30.0).abs() < 1e-9, "{}", mesh.volume());

@@ -391,26 +391,20 @@ pub(super) fn drawn(image: &[Vec3]) -> Option<Picture> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tests::box_triangles;
     use crate::tests::segments::adapter;
 
     /// The faces of a cube of side 2 around a point on the x-axis, which turn outwards.
-    fn cube(first: usize, x: f32) -> String {
+    fn cube(first: u32, x: f32) -> String {
         let mut text = String::new();
         for k in 0..8 {
             let sign = |bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
             let [dx, dy, dz] = [0, 1, 2].map(sign);
             text += &format!("v {} {dy} {dz}\n", x + dx);
         }
-        for face in [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ] {
-            let [a, b, c, d] = face.map(|corner| corner + 1 + first);
-            text += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+        for triangle in box_triangles() {
+            let [a, b, c] = triangle.map(|corner| corner + 1 + first);
+            text += &format!("f {a} {b} {c}\n");
         }
         text
     }
