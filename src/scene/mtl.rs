@@ -64,18 +64,18 @@ impl Library {
     }
 
     /// Loads the libraries of a statement: a single file whose name may contain blanks, if it
-    /// exists or only the last word ends as one and not all words are files, or several. Returns the indices of their materials by name. Broken
-    /// libraries are warnings.
+    /// exists or only the last word ends as one and not all words are files, or several. Returns
+    /// the indices of their materials by name. Broken libraries are warnings.
     pub(crate) fn load(&self, names: &str) -> HashMap<String, u32> {
         let cut = without_comment(names).trim();
         let is_there = |name: &str| spelt(&[&self.folder], name).is_some();
-        let are_there = cut.split_whitespace().all(is_there);
+        let are_there = || cut.split_whitespace().all(is_there);
         match [names, cut]
             .iter()
             .find_map(|name| spelt(&[&self.folder], name))
         {
             Some(name) => self.load_one(&name),
-            None if !are_there && cut.to_ascii_lowercase().matches(".mtl").count() == 1 => {
+            None if cut.to_ascii_lowercase().matches(".mtl").count() == 1 && !are_there() => {
                 self.load_one(cut)
             }
             None => cut
