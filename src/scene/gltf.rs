@@ -104,6 +104,7 @@ fn build(
         document,
         data,
         sets: &palette.sets,
+        materials: &palette.materials,
         builder: SceneBuilder::new(!palette.images.is_empty(), 0),
         camera: None,
         lights: Vec::new(),
@@ -154,6 +155,8 @@ pub(super) struct Geometry<'a> {
     pub data: &'a Data<'a>,
     /// Texture coordinate set of each material.
     pub sets: &'a [Option<u32>],
+    /// Materials of the file, in its order.
+    pub materials: &'a [Material],
     pub builder: SceneBuilder,
     camera: Option<Camera>,
     lights: Vec<Light>,

@@ -139,6 +139,13 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(Value, Option<String>), String> {
         Ok(value) => return Ok((value, None)),
         Err(error) => error.to_string(),
     };
+    if !text.trim_start().starts_with('{') {
+        let start: String = text.chars().take(8).collect();
+        return Err(format!(
+            "neither binary glTF, which begins with `glTF`, nor JSON text, which begins with `{{`: it begins with {start:?}; \
+             export or download the model again"
+        ));
+    }
     match serde_json::from_str(&mended(text)) {
         Ok(value) => Ok((value, Some(fault))),
         Err(_) => Err(fault),

@@ -4,6 +4,7 @@ use super::gltf::{Geometry, Place};
 use super::gltf_data::Values;
 use super::gltf_document::Item;
 use super::gltf_pose::{Moved, Pose};
+use super::material::Material;
 use super::normals::of_normals;
 use glam::{DMat3, Mat4, Vec2, Vec3};
 use raystone_core::geometry::Triangle;
@@ -56,7 +57,7 @@ impl<'a> Geometry<'a> {
         let colors = self.read_colors(primitive, pose, positions.len(), place);
         let material = self.material(primitive, !colors.is_empty(), place);
         let set = self.sets.get(material).copied().flatten();
-        self.see_attributes(attributes, set, matches!(moved, Moved::Each(_)), place);
+        self.see_attributes(primitive, set, matches!(moved, Moved::Each(_)), place);
         let uvs = self.read_uvs(primitive, pose, set, place);
         let normals = self.read_normals(primitive, pose, &moved, place);
         let counts = [colors.len(), normals.len(), uvs.len()];
@@ -137,20 +138,27 @@ impl<'a> Geometry<'a> {
         }
     }
 
-    /// Records attributes that are not read. Skins and morph targets are handled elsewhere, and
-    /// unused texture coordinates lose nothing.
+    /// The material that the file has for a primitive.
+    fn own_material(&self, primitive: Item<'a>) -> Option<&'a Material> {
+        self.materials.get(primitive.index("material")?)
+    }
+
+    /// Records attributes that are not read. Skins and morph targets are handled elsewhere; unused
+    /// texture coordinates lose nothing, nor do tangents where no texture bends normals.
     fn see_attributes(
         &mut self,
-        attributes: Item<'a>,
+        primitive: Item<'a>,
         set: Option<u32>,
         is_skinned: bool,
         place: Place<'_>,
     ) {
         let used = set.map(|set| format!("TEXCOORD_{set}"));
         let of_skin = |name: &str| name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_");
-        for (name, _) in attributes.members() {
+        let material = self.own_material(primitive);
+        let is_bent = material.is_some_and(|own| own.normal_texture.is_some());
+        for (name, _) in primitive.get("attributes").members() {
             let is_read = ["POSITION", "NORMAL", "COLOR_0", "TEXCOORD_0"].contains(&name);
-            let is_read = is_read || is_skinned && of_skin(name);
+            let is_read = is_read || is_skinned && of_skin(name) || name == "TANGENT" && !is_bent;
             if !is_read && used.as_deref() != Some(name) {
                 self.notes.unread(format!("`{name}`"), place);
             }
@@ -225,7 +233,10 @@ impl<'a> Geometry<'a> {
             values.unit_vectors::<4>()
         };
         let mut colors = self.read(primitive.get("attributes"), "COLOR_0", place, rgba);
-        if colors.iter().any(|[.., alpha]| *alpha < 1.0) {
+        // Opaque materials have no alpha, whatever the colours say.
+        let material = self.own_material(primitive);
+        let is_cut = material.is_some_and(|own| own.mask.is_some());
+        if is_cut && colors.iter().any(|[.., alpha]| *alpha < 1.0) {
             self.notes.unread("alpha of `COLOR_0`", place);
         }
         if (colors.iter().flatten()).any(|x| !(0.0..=1.0).contains(x)) {

@@ -415,7 +415,7 @@ fn corner(word: &str, counts: [usize; 3]) -> Result<(Corner, bool), String> {
         if part.is_empty() && k > 0 {
             continue;
         }
-        let value: i64 = part.parse().map_err(|_| none())?;
+        let value = whole(part).ok_or_else(none)?;
         let index = match value {
             1.. => value - 1,
             _ => value.saturating_add(counts[k] as i64),
@@ -429,6 +429,16 @@ fn corner(word: &str, counts: [usize; 3]) -> Result<(Corner, bool), String> {
         };
     }
     Ok((Corner(corner), parts.all(str::is_empty)))
+}
+
+/// Parses an index; some write it as a number with a point (`1.0`), or set corners apart by commas (`1,`).
+fn whole(part: &str) -> Option<i64> {
+    part.parse().ok().or_else(|| {
+        let part = part.strip_suffix(',').unwrap_or(part);
+        let zeros = |after: &str| after.bytes().all(|digit| digit == b'0');
+        let (whole, after) = part.split_once('.').unwrap_or((part, ""));
+        zeros(after).then(|| whole.parse().ok())?
+    })
 }
 
 fn beyond(vertex: i64, count: usize, place: &str) -> String {

@@ -158,7 +158,7 @@ fn take(arguments: &Arguments, screen: Screen, file: &Path) -> Result<(), String
         eprintln!("first picture after {:.1} s", ms / 1e3);
     }
     println!("{}", file.display());
-    Ok(())
+    screenshot::all_made(&found.frame.sides)
 }
 
 fn open(arguments: &Arguments, screen: Screen) -> Result<(), String> {

@@ -6,7 +6,7 @@ use eframe::egui;
 use eframe::egui_wgpu::WgpuSetup;
 use eframe::wgpu;
 use egui_kittest::Harness;
-use raystone_viewer::{Screen, SideFrame};
+use raystone_viewer::{SIDE_NAMES, Screen, SideFrame};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -75,6 +75,21 @@ pub fn wait(worker: &Worker, screen: &Screen, frames: u32) -> Result<(), String>
     Err(format!(
         "the images did not get {frames} samples within {seconds} s"
     ))
+}
+
+/// Checks that a picture shows every image.
+///
+/// # Errors
+/// Each image that could not be made, and why.
+pub fn all_made(sides: &[SideFrame]) -> Result<(), String> {
+    let faults: Vec<String> = (sides.iter().zip(SIDE_NAMES))
+        .filter_map(|(side, name)| Some((name, side.fault.as_ref()?)))
+        .map(|(name, fault)| format!("image {name} could not be made: {fault}"))
+        .collect();
+    if faults.is_empty() {
+        return Ok(());
+    }
+    Err(faults.join("\n"))
 }
 
 /// Writes a picture of the window.

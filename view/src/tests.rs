@@ -460,6 +460,8 @@ fn an_image_that_cannot_be_made_says_so_and_nothing_else_does() {
     let harness = window(&arguments, 1);
     assert!(has(&harness, "cells of a uniform-grid"));
     assert!(has(&harness, "uniform-grid(lambda=1000) failed after"));
+    let made = screenshot::all_made(&harness.state().worker.found().frame.sides);
+    assert!(made.unwrap_err().starts_with("image A could not be made: "));
     for untrue in ["built in", "compiled in", "coarse image"] {
         assert!(!has(&harness, untrue), "{untrue}");
     }

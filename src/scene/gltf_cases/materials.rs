@@ -37,6 +37,16 @@ const PLAIN: [f32; 3] = [0.2, 0.4, 0.6];
 #[test]
 fn textures_are_drawn_or_their_constant_is() {
     textured("a texture").load().whole(2).images(1);
+    let with_tangents = |name| {
+        textured(name)
+            .accessor(floats([1.0, 0.0, 0.0, 1.0].repeat(4)), 5126, "VEC4", 4)
+            .set("/meshes/0/primitives/0/attributes/TANGENT", json!(3))
+    };
+    with_tangents("tangents that nothing uses").load().whole(2);
+    with_tangents("tangents of a bent normal")
+        .set("/materials/0/normalTexture", json!({"index": 0}))
+        .load()
+        .but(2, &["`TANGENT` (mesh 0 `square`, primitive 0)"]);
     textured("a source of its own")
         .set(
             "/textures/0/extensions",

@@ -78,6 +78,8 @@ const OBJ: &[(&str, Outcome)] = &[
         Reads(".", &["`Red`"]),
     ),
     ("v 0 0 1 # origin\nf 1 2 5 # x\n", Reads(".", &[])),
+    ("f 1.0 2.000 3.\nf 1, 3, 4\n", Reads("..", &[])),
+    ("f -4.0 -3, 3\n", Reads(".", &[])),
     ("v 0 0 1 1 0 0\nf 5 1 2\n", Reads("r", &[])),
     ("vt 0\nvt 0.5\nf 1/1 2/2 3/2\n", Reads(".", &[])),
     (

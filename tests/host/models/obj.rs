@@ -123,6 +123,8 @@ fn broken_obj_files_say_the_line_and_what_is_wrong() {
         ("f 1 2 -5\n", "(line 5): the face refers to vertex -5"),
         ("f 1 2 0\n", "(line 5): the face refers to vertex 0"),
         ("f 1 2 x\n", "(line 5): `x` is not a face corner"),
+        ("f 1 2 1.5\n", "(line 5): `1.5` is not a face corner"),
+        ("f 1 2 .0\n", "(line 5): `.0` is not a face corner"),
         ("v 1 2\nf 1 2 5\n", "(line 5): `v` with 2 numbers"),
         ("v 1 2 x\nf 1 2 5\n", "(line 5): `x` is not a number"),
         ("", "no triangles"),

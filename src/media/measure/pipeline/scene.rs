@@ -451,7 +451,7 @@ mod tests {
     }
 
     #[test]
-    fn flip_of_an_image_is_the_mean_of_its_parts() {
+    fn errors_of_an_image_are_those_of_its_parts() {
         let Some(gpu) = adapter() else { return };
         let load = Load {
             content: Content::Ball,
@@ -472,5 +472,25 @@ mod tests {
             (mean - whole).abs() < 1e-12 && whole > 0.05,
             "{mean} {whole}"
         );
+
+        // A tenth of the mean is added to all channels of one part's pixels.
+        let sum: f64 = (scene.many.iter())
+            .map(|p| f64::from(p.element_sum()))
+            .sum();
+        let tenth = 0.1 * sum / (3.0 * scene.many.len() as f64);
+        let kinds = scene.parts.as_ref().unwrap();
+        for (k, kind) in kinds.iter().enumerate() {
+            let pixels = scene.many.iter().zip(kind);
+            let raised: Vec<Vec3> = pixels
+                .map(|(pixel, is_of)| pixel + Vec3::splat(f64::from(*is_of) as f32 * tenth as f32))
+                .collect();
+            let mut expected = [0.0; 3];
+            expected[k] = 0.1;
+            let found = scene.noise_of_parts(&raised).unwrap();
+            let whole = 0.1 * (sizes[k] / scene.many.len() as f64).sqrt();
+            let close = |a: f64, b: f64| (a - b).abs() < 1e-6;
+            assert!((0..3).all(|j| close(found[j], expected[j])), "{found:?}");
+            assert!(close(scene.noise(&raised), whole), "{whole}");
+        }
     }
 }
