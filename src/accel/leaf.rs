@@ -7,7 +7,7 @@ use super::tree::Coverage;
 use super::triangle::TriangleRecord;
 use super::twin::Walk;
 use super::watch;
-use super::{AccelError, NamedWords, TriangleSoup};
+use super::{AccelError, FEWER, NamedWords, TriangleSoup};
 
 /// Marks a leaf reference; bits 26–30 hold its count, bits 0–25 its first index.
 pub(crate) const LEAF: u32 = 0x8000_0000;
@@ -47,7 +47,12 @@ impl Leaves {
         order: &[u32],
         indexed: bool,
     ) -> Result<Self, AccelError> {
-        AccelError::check_limit("triangles in the leaves", order.len() as u64, FIRST_MASK)?;
+        AccelError::check_limit(
+            "triangles in the leaves",
+            order.len() as u64,
+            FIRST_MASK,
+            FEWER,
+        )?;
         let record = |&id: &u32| soup.records[id as usize];
         Ok(if indexed {
             Self::Indexed(order.to_vec())

@@ -90,7 +90,7 @@ use triangle::TriangleRecord;
 #[derive(Debug, Clone, Error, PartialEq)]
 pub enum AccelError {
     /// A hard limit of the structure, with both numbers.
-    #[error("{what}: needs {needed}, the limit is {limit}")]
+    #[error("{what}: needs {needed}, the limit is {limit}; {remedy}")]
     Limit {
         /// The limit.
         what: String,
@@ -98,6 +98,8 @@ pub enum AccelError {
         needed: u64,
         /// The value the structure allows.
         limit: u64,
+        /// What to do.
+        remedy: &'static str,
     },
     /// An unknown parameter, or a value that is not allowed.
     #[error(transparent)]
@@ -117,11 +119,12 @@ impl AccelError {
     /// Checks `needed` against `limit`.
     ///
     /// # Errors
-    /// [`AccelError::Limit`] with both numbers.
+    /// [`AccelError::Limit`] with both numbers and the remedy.
     pub(crate) fn check_limit(
         what: impl Into<String>,
         needed: impl Into<u64>,
         limit: impl Into<u64>,
+        remedy: &'static str,
     ) -> Result<(), Self> {
         let (what, needed, limit) = (what.into(), needed.into(), limit.into());
         if needed <= limit {
@@ -131,9 +134,13 @@ impl AccelError {
             what,
             needed,
             limit,
+            remedy,
         })
     }
 }
+
+/// What to do where a structure cannot hold so many triangles.
+pub(crate) const FEWER: &str = "take fewer triangles (`most_triangles` of the scene)";
 
 /// The triangles of a scene for structures: the canonical records.
 #[derive(Debug, Clone, Default)]

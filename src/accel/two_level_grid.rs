@@ -7,7 +7,9 @@
 //! exits the cell, and then finds its position in the next one.
 
 use super::grid::lists::{Lists, PartLists, check_lists, check_starts, in_runs};
-use super::grid::{Cut, Grid, GridBox, areas, clamped, finest, first_axis, most_words, outside};
+use super::grid::{
+    COARSER, Cut, Grid, GridBox, areas, clamped, finest, first_axis, most_words, outside,
+};
 use super::structure::prelude::*;
 use super::watch;
 use rayon::prelude::*;
@@ -89,6 +91,7 @@ fn cut(
         "cells of a two-level-grid",
         2 * tops as u64 + needed + 1,
         most,
+        COARSER,
     )?;
 
     let cut_run = |cells: std::ops::Range<usize>| {
@@ -115,7 +118,7 @@ fn cut(
     };
     let runs = in_runs(tops, cut_run);
     let references: u64 = runs.iter().map(|r| r.references.len() as u64).sum();
-    AccelError::check_limit("references of a two-level-grid", references, most)?;
+    AccelError::check_limit("references of a two-level-grid", references, most, COARSER)?;
     Ok(Built::join(
         grid,
         &runs,

@@ -55,7 +55,12 @@ impl Structure for UniformGrid {
         if skip {
             let what =
                 "references of a uniform-grid with distances, which leave 25 bits to a place";
-            AccelError::check_limit(what, references.len() as u64, START_MASK)?;
+            AccelError::check_limit(
+                what,
+                references.len() as u64,
+                START_MASK,
+                "set `skip = \"none\"`",
+            )?;
         }
         let mut built = Built {
             grid,

@@ -182,7 +182,12 @@ pub(super) fn check_leaves(tree: &Tree) -> Result<(), AccelError> {
         NodeKind::Leaf { count, .. } => *count,
     };
     let fullest = tree.nodes.iter().map(|n| count(&n.kind)).max().unwrap_or(0);
-    AccelError::check_limit("triangles in one leaf of a bvh", fullest, COUNT_MASK)
+    AccelError::check_limit(
+        "triangles in one leaf of a bvh",
+        fullest,
+        COUNT_MASK,
+        "set `leaf_size` lower",
+    )
 }
 
 impl BuiltAccel for BuiltBvh {

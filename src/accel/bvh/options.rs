@@ -173,12 +173,22 @@ impl BvhParameters {
     /// Its stack does not fit into workgroup memory, or its trail into two words.
     pub(super) fn check_depth(&self, depth: u32) -> Result<(), AccelError> {
         if self.traversal == Traversal::ShortStack {
-            AccelError::check_limit("levels of a restart trail", depth, TRAIL_LEVELS)?;
+            AccelError::check_limit(
+                "levels of a restart trail",
+                depth,
+                TRAIL_LEVELS,
+                "choose another `traversal`",
+            )?;
         }
         if self.stack_memory == StackMemory::Workgroup {
             let bytes = self.stack_entries(depth) * LANES * 4;
             let what = "bytes of stacks in workgroup memory";
-            AccelError::check_limit(what, bytes, WORKGROUP_BYTES)?;
+            AccelError::check_limit(
+                what,
+                bytes,
+                WORKGROUP_BYTES,
+                "choose another `stack_memory`",
+            )?;
         }
         Ok(())
     }

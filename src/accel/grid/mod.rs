@@ -24,12 +24,15 @@ pub(crate) fn most_words(log: &BuildLog) -> u64 {
     log.most_words() - 1
 }
 
+/// What to do about a grid of too many words.
+pub(crate) const COARSER: &str = "set `lambda` (or `lambda1`, `lambda2`) lower";
+
 /// Checks `needed` words against [`most_words`].
 ///
 /// # Errors
 /// [`AccelError::Limit`] with both numbers.
 pub(crate) fn check_words(what: &str, needed: u64, log: &BuildLog) -> Result<(), AccelError> {
-    AccelError::check_limit(what, needed, most_words(log))
+    AccelError::check_limit(what, needed, most_words(log), COARSER)
 }
 
 /// The box that a grid fills, and the accuracy of positions in it.

@@ -7,7 +7,7 @@ use super::super::intersection::Intersection;
 use super::super::leaf::{FIRST_MASK, leaf_range};
 use super::super::tree::{Coverage, Tree, TreeParameters};
 use super::super::triangle::TriangleRecord;
-use super::super::{AccelError, BuildLog, TriangleSoup};
+use super::super::{AccelError, BuildLog, FEWER, TriangleSoup};
 use crate::StructureStats;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -57,7 +57,12 @@ impl Forest {
         });
         let trees = trees?;
         let needed: u64 = trees.iter().map(|tree| tree.order.len() as u64).sum();
-        AccelError::check_limit("triangles in the leaves of all objects", needed, FIRST_MASK)?;
+        AccelError::check_limit(
+            "triangles in the leaves of all objects",
+            needed,
+            FIRST_MASK,
+            FEWER,
+        )?;
         Ok(log.phase("layout", || {
             let mut forest = Self {
                 intersection: objects

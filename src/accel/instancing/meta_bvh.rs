@@ -61,7 +61,7 @@ impl Structure for MetaBvh {
 fn check_entries(instances: usize, rebraid: usize) -> Result<(), AccelError> {
     let needed = instances as u64 * rebraid.max(1) as u64;
     let what = "entries of the upper level of a meta-bvh";
-    AccelError::check_limit(what, needed, FIRST_MASK)
+    AccelError::check_limit(what, needed, FIRST_MASK, "set `rebraid` lower")
 }
 
 struct Instances {

@@ -2,7 +2,7 @@
 //! of triangles, with one cell per voxel; empty octants are one cell from the start.
 
 use super::super::grid::lists::{Lists, PartLists, in_runs};
-use super::super::grid::{Cut, Grid, GridBox, areas, finest, most_words};
+use super::super::grid::{COARSER, Cut, Grid, GridBox, areas, finest, most_words};
 use super::super::{AccelError, TriangleSoup};
 use super::voxels::{Block, Entry, GridCell, Map};
 use super::{MOST_PLACES, Options, Partition};
@@ -40,7 +40,7 @@ pub(super) fn cut(
             1u64 << (3 * parts_log(&fine, settings, shift, areas))
         };
         let needed: u64 = (0..tops).into_par_iter().map(voxels).sum();
-        AccelError::check_limit(format!("voxels of an {name}"), needed, most)?;
+        AccelError::check_limit(format!("voxels of an {name}"), needed, most, COARSER)?;
         let cut_run = |cells: std::ops::Range<usize>| {
             let mut run = Run {
                 fine: &fine,

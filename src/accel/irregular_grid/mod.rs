@@ -18,7 +18,7 @@ mod voxels;
 
 use self::voxels::{GridCell, Map};
 use super::grid::lists::check_lists;
-use super::grid::{Grid, check_words, clamped, first_axis, most_words, outside};
+use super::grid::{COARSER, Grid, check_words, clamped, first_axis, most_words, outside};
 use super::structure::prelude::*;
 use super::watch;
 use raystone_gpu::UniformValues;
@@ -74,6 +74,7 @@ impl Structure for IrregularGrid {
             "map and references of an irregular-grid",
             arrays.words.len() as u64,
             most_words(log).min(MOST_PLACES),
+            COARSER,
         )?;
         Ok(Box::new(Built {
             fine: partition.fine,

@@ -10,7 +10,7 @@ use crate::polygon::Polygon;
 use crate::spatial::Margin;
 use crate::tree::NodeKind;
 use crate::tree::grow::{Grown, PARALLEL_GRAIN, grow};
-use crate::{AccelError, BuildLog, TriangleSoup};
+use crate::{AccelError, BuildLog, FEWER, TriangleSoup};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -38,7 +38,7 @@ pub(super) fn build(
     log: &mut BuildLog,
 ) -> Result<KdTree, AccelError> {
     let count = soup.records.len() as u64;
-    AccelError::check_limit("triangles of a kd-tree", count, MAX_ITEMS - 1)?;
+    AccelError::check_limit("triangles of a kd-tree", count, MAX_ITEMS - 1, FEWER)?;
     let settings = Settings {
         options,
         kept_if_empty: 1.0 - options.empty_bonus,
@@ -63,7 +63,12 @@ pub(super) fn build(
     });
     // Beyond the limit cells are not split, so the full number is unknown.
     let made = (grown.order.len() as u64).min(MAX_REFERENCES + 1);
-    AccelError::check_limit("references of a kd-tree, at least", made, MAX_REFERENCES)?;
+    AccelError::check_limit(
+        "references of a kd-tree, at least",
+        made,
+        MAX_REFERENCES,
+        "set `max_depth` lower",
+    )?;
     let nodes = log.phase("layout", || lay_out(&grown));
     let references = grown.order;
     Ok(KdTree { nodes, references })

@@ -11,6 +11,8 @@ use rayon::prelude::*;
 const MAX_BLOCKS: u64 = 1 << (31 - INNER_SHIFT);
 /// Limit on references: 31-bit indices, for triangles as well.
 const MAX_REFERENCES: u64 = 1 << 31;
+/// What to do beyond these.
+const SHALLOWER: &str = "set `max_depth` lower or `leaf_size` higher";
 /// A level that would exceed this many references per triangle is not started: where many large
 /// triangles coincide, cells along their edges would never run out.
 const MOST_REFERENCES_PER_TRIANGLE: usize = 16;
@@ -267,7 +269,17 @@ fn assemble(
         tree.nodes[cell.slot] = (block as u32) << INNER_SHIFT | filled;
     }
     let (blocks, references) = (tree.nodes.len() as u64 / 8, tree.references.len() as u64);
-    AccelError::check_limit("cells of an octree that have children", blocks, MAX_BLOCKS)?;
-    AccelError::check_limit("references of an octree", references, MAX_REFERENCES)?;
+    AccelError::check_limit(
+        "cells of an octree that have children",
+        blocks,
+        MAX_BLOCKS,
+        SHALLOWER,
+    )?;
+    AccelError::check_limit(
+        "references of an octree",
+        references,
+        MAX_REFERENCES,
+        SHALLOWER,
+    )?;
     Ok((next_cells, next_triangles))
 }

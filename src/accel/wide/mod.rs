@@ -50,7 +50,12 @@ fn wide_tree(
         NodeKind::Inner { .. } => 0,
     });
     let largest = largest.max().unwrap_or(0);
-    AccelError::check_limit("triangles of a leaf before the collapse", largest, 1_u64)?;
+    AccelError::check_limit(
+        "triangles of a leaf before the collapse",
+        largest,
+        1_u64,
+        crate::FEWER,
+    )?;
     Ok(tree)
 }
 
@@ -118,7 +123,7 @@ impl<N: WideNode> Wide<N> {
             }),
         };
         let what = format!("nodes of a {}", N::STRUCTURE);
-        AccelError::check_limit(what, wide.nodes.len() as u64, N::MOST_NODES)?;
+        AccelError::check_limit(what, wide.nodes.len() as u64, N::MOST_NODES, crate::FEWER)?;
         Ok(log.phase("layout", || {
             let nodes: Vec<N> = wide.nodes.iter().map(|slots| N::pack(slots)).collect();
             let leaf_triangles = wide.records(soup);

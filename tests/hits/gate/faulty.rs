@@ -75,6 +75,7 @@ impl AccelKind for Faulty {
                 what: "planted limit".to_owned(),
                 needed: 2,
                 limit: 1,
+                remedy: "plant another",
             });
         }
         let inner = self.inner.build(soup, params, log)?;

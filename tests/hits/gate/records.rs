@@ -40,7 +40,10 @@ fn structures_that_fail_the_gate_are_told_and_get_no_figures() {
         ),
         (SHORT_STACK.name(), "a traversal stack overflowed"),
         (NOT_VALID.name(), "node 3: planted fault"),
-        (NOT_BUILT.name(), "planted limit: needs 2, the limit is 1"),
+        (
+            NOT_BUILT.name(),
+            "planted limit: needs 2, the limit is 1; plant another",
+        ),
     ];
     for (name, text) in faults {
         let structure = structures[name];

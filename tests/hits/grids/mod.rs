@@ -372,7 +372,9 @@ fn a_grid_over_its_cap_says_so_with_both_numbers() {
                 what: said,
                 needed,
                 limit,
+                remedy,
             }) => {
+                assert!(remedy.contains("lambda"), "{name}: {remedy}");
                 assert!(said.contains(what), "{name}: {said}");
                 assert!(
                     needed > limit && limit == (1 << 25) - 1,
