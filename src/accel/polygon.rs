@@ -100,14 +100,18 @@ impl Polygon {
 
     /// Its box, grown by `margin` and rounded outwards; `None` if nothing is left.
     pub(crate) fn bounds(&self, margin: f64) -> Option<Bounds> {
-        let least = |sign: f64, axis: usize| {
-            let along = self.corners().iter().map(|corner| sign * corner[axis]);
-            // Rounding is monotone: the least is rounded once for all.
-            rounded_down(along.fold(f64::INFINITY, |a, b| if b < a { b } else { a }) - margin)
-        };
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for corner in self.corners() {
+            for axis in 0..3 {
+                let x = corner[axis];
+                low[axis] = if x < low[axis] { x } else { low[axis] };
+                high[axis] = if x > high[axis] { x } else { high[axis] };
+            }
+        }
+        // Rounding is monotone: the least is rounded once for all.
         (self.count > 0).then(|| Bounds {
-            min: std::array::from_fn(|a| least(1.0, a)),
-            max: std::array::from_fn(|a| -least(-1.0, a)),
+            min: low.map(|x| rounded_down(x - margin)),
+            max: high.map(|x| -rounded_down(-x - margin)),
         })
     }
 }

@@ -17,6 +17,17 @@ const SHALLOWER: &str = "set `max_depth` lower or `leaf_size` higher";
 /// triangles coincide, cells along their edges would never run out.
 const MOST_REFERENCES_PER_TRIANGLE: usize = 16;
 
+/// The bits of each mask of children, side by side.
+const BITS: [[u32; 8]; 256] = {
+    let mut bits = [[0; 8]; 256];
+    let mut at = 0;
+    while at < 8 * 256 {
+        bits[at / 8][at % 8] = (at / 8) as u32 >> (at % 8) & 1;
+        at += 1;
+    }
+    bits
+};
+
 /// Cells and references in their final order.
 pub(super) struct Octree {
     /// Block 0 has the root first; each other block holds the children of a cell.
@@ -36,7 +47,7 @@ struct Open {
 
 /// Triangles of the eight children of a cell, one after the other.
 struct Children {
-    ends: [usize; 8],
+    ends: [u32; 8],
     triangles: Vec<u32>,
 }
 
@@ -86,10 +97,11 @@ struct Settings<'a> {
 
 /// What most cells need of a triangle, side by side in memory: lists of cells read it at random.
 #[derive(Clone, Copy)]
+#[repr(align(32))]
 struct Extent {
     bounds: Bounds,
-    /// Scene units; none if triangles are not clipped.
-    margin: Option<f64>,
+    /// Scene units; below 0 if triangles are not clipped.
+    margin: f64,
 }
 
 impl<'a> Settings<'a> {
@@ -97,7 +109,11 @@ impl<'a> Settings<'a> {
         let margin = Margin::new(&soup.bounds());
         let extent = |record: &TriangleRecord| Extent {
             bounds: record.bounds(),
-            margin: options.clip.then(|| margin.of(record)),
+            margin: if options.clip {
+                margin.of(record)
+            } else {
+                -1.0
+            },
         };
         Self {
             soup,
@@ -122,7 +138,9 @@ impl<'a> Settings<'a> {
         };
         let divided: Vec<Option<Children>> = (0..cells.len())
             .into_par_iter()
-            .map(|i| self.divide(cells[i].position, list(i), depth))
+            .map_init(Vec::new, |octants, i| {
+                self.divide(cells[i].position, list(i), depth, octants)
+            })
             .collect();
         let made: usize = divided.iter().flatten().map(|c| c.triangles.len()).sum();
         if made > MOST_REFERENCES_PER_TRIANGLE * self.soup.records.len() {
@@ -132,31 +150,40 @@ impl<'a> Settings<'a> {
     }
 
     /// The children of a cell; `None` if it becomes a leaf.
-    fn divide(&self, position: [u32; 3], triangles: &[u32], depth: u32) -> Option<Children> {
+    fn divide(
+        &self,
+        position: [u32; 3],
+        triangles: &[u32],
+        depth: u32,
+        octants: &mut Vec<u8>,
+    ) -> Option<Children> {
         if triangles.len() <= self.options.leaf_size {
             return None;
         }
         let cell = Divided::new(self.space, position, depth);
-        let octants: Vec<u8> = triangles
-            .iter()
-            .map(|&id| self.octants(id, &cell))
-            .collect();
-        let listed: u32 = octants.iter().map(|mask| mask.count_ones()).sum();
+        octants.clear();
+        octants.extend(triangles.iter().map(|&id| self.octants(id, &cell)));
+        let mut counts = [0; 8];
+        for mask in octants.iter() {
+            let bits = &BITS[usize::from(*mask)];
+            (counts.iter_mut().zip(bits)).for_each(|(count, bit)| *count += bit);
+        }
+        let listed: u32 = counts.iter().sum();
         // Every child has a quarter of the area of its parent.
         let cost = self.options.traversal_cost + 0.25 * f64::from(listed);
         if cost >= triangles.len() as f64 {
             return None;
         }
-        Some(Children::new(triangles, &octants))
+        Some(Children::new(triangles, octants, counts))
     }
 
     /// The children of a cell that list a triangle, one bit each.
     fn octants(&self, id: u32, cell: &Divided) -> u8 {
         let extent = &self.extents[id as usize];
         let mask = by_box(&extent.bounds, cell.middle);
-        let Some(margin) = extent.margin.filter(|_| !mask.is_power_of_two()) else {
+        if mask.is_power_of_two() || extent.margin < 0.0 {
             return mask;
-        };
+        }
         let vertices = self.soup.records[id as usize].vertices();
         let from_centre =
             vertices.map(|v| std::array::from_fn(|a| f64::from(v[a]) - cell.centre[a]));
@@ -169,28 +196,25 @@ impl<'a> Settings<'a> {
         if mask & !held == 0 {
             return mask;
         }
-        mask & !missed_octants(&from_centre, cell.size, margin)
+        mask & !missed_octants(&from_centre, cell.size, extent.margin)
     }
 }
 
 impl Children {
-    fn new(triangles: &[u32], octants: &[u8]) -> Self {
-        let mut ends = [0; 8];
-        for mask in octants {
-            (0..8).for_each(|octant| ends[octant] += usize::from(mask >> octant & 1));
-        }
-        let (mut places, mut end) = ([0; 8], 0);
-        for (place, count) in places.iter_mut().zip(&mut ends) {
-            *place = end;
-            end += *count;
-            *count = end;
-        }
-        let mut listed = vec![0; ends[7]];
+    /// From how many triangles each child lists.
+    fn new(triangles: &[u32], octants: &[u8], counts: [u32; 8]) -> Self {
+        let mut end = 0;
+        let ends = counts.map(|count| {
+            end += count;
+            end
+        });
+        let mut places: [u32; 8] = std::array::from_fn(|child| ends[child] - counts[child]);
+        let mut listed = vec![0; end as usize];
         for (id, mask) in triangles.iter().zip(octants) {
             let mut left = *mask;
             while left != 0 {
                 let octant = left.trailing_zeros() as usize;
-                listed[places[octant]] = *id;
+                listed[places[octant] as usize] = *id;
                 places[octant] += 1;
                 left &= left - 1;
             }
@@ -253,7 +277,7 @@ fn assemble(
         let block = tree.nodes.len() / 8;
         let (mut filled, mut start) = (0, 0);
         for octant in 0..8 {
-            let end = children.ends[octant];
+            let end = children.ends[octant] as usize;
             if start < end {
                 filled |= 1 << octant;
                 next_cells.push(Open {

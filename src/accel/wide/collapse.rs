@@ -107,12 +107,12 @@ impl WideTree {
         let costs = Costs::new(tree, shape.width, settings);
         // Wide nodes whose children are not yet found, as (index, binary node, depth).
         let mut open = vec![(0_u32, 0_u32, 1_u32)];
-        let mut listed = Vec::new();
+        let (mut roots, mut listed) = (Vec::new(), Vec::new());
         while let Some((place, binary, depth)) = open.pop() {
             out.depth = out.depth.max(depth);
-            let roots = costs.children(binary).into_iter();
-            let mut children: Vec<WideChild> = roots
-                .map(|root| WideChild {
+            costs.children(binary, &mut roots);
+            let mut children: Vec<WideChild> = (roots.iter())
+                .map(|&root| WideChild {
                     bounds: tree.nodes[root as usize].bounds,
                     kind: costs.kind(root),
                 })

@@ -146,23 +146,27 @@ impl<'a> Costs<'a> {
         }
     }
 
-    /// Binary roots of the children of the wide node that replaces `node`.
-    pub(super) fn children(&self, node: u32) -> Vec<u32> {
-        let mut roots = Vec::with_capacity(self.width as usize);
-        // Subtrees with their numbers of children, the first last.
-        let mut open = vec![(node, self.width)];
-        while let Some((subtree, children)) = open.pop() {
+    /// Binary roots of the children of the wide node that replaces `node`, in place of those of another.
+    pub(super) fn children(&self, node: u32, roots: &mut Vec<u32>) {
+        roots.clear();
+        // Subtrees with their numbers of children, the first last: each has a child at least.
+        let mut open = [(node, self.width); MAX_WIDTH];
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let (subtree, children) = open[count];
             let choices = self.choices[subtree as usize];
             let most = used(choices, children);
             match self.links(subtree) {
                 Some([left, right]) if most > 1 => {
                     let first = choices >> (BITS * (most - FEWEST)) & 7;
-                    open.extend([(right, most - first), (left, first)]);
+                    open[count] = (right, most - first);
+                    open[count + 1] = (left, first);
+                    count += 2;
                 }
                 _ => roots.push(subtree),
             }
         }
-        roots
     }
 }
 

@@ -51,23 +51,49 @@ pub(crate) fn check() -> Result<(), String> {
     })
 }
 
-/// The children in slots, assigned greedily by best agreement. Empty slots get an empty leaf.
+/// The children in slots, assigned greedily by best agreement; of equal ones the first child's, and its first slot's. Empty
+/// slots get an empty leaf.
 pub(super) fn arrange(bounds: &Bounds, children: &[WideChild]) -> Vec<WideChild> {
     let middle = bounds.doubled_centre();
-    let mut pairs: Vec<(f32, usize, usize)> = Vec::with_capacity(SLOTS * SLOTS);
-    for (index, child) in children.iter().enumerate() {
+    let mut agreements = [[0; SLOTS]; SLOTS];
+    for (row, child) in agreements.iter_mut().zip(children) {
         let centre = child.bounds.doubled_centre();
         let offset = [0, 1, 2].map(|axis| centre[axis] - middle[axis]);
-        pairs.extend((0..SLOTS).map(|slot| (agreement(offset, slot), index, slot)));
+        *row = std::array::from_fn(|slot| ordered(agreement(offset, slot)));
     }
-    pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+    let mut free = [true; SLOTS];
+    let best_of = |index: usize, free: &[bool; SLOTS]| {
+        let mut best: Option<(i32, usize)> = None;
+        for (slot, &found) in agreements[index].iter().enumerate() {
+            if free[slot] && best.is_none_or(|(most, _)| found > most) {
+                best = Some((found, slot));
+            }
+        }
+        let (agreement, slot) = best.expect("no more children than slots");
+        (agreement, index, slot)
+    };
     let mut slots = vec![WideChild::NOTHING; SLOTS];
-    let (mut placed, mut taken) = ([false; SLOTS], [false; SLOTS]);
-    for (_, index, slot) in pairs {
-        if !placed[index] && !taken[slot] {
-            (placed[index], taken[slot]) = (true, true);
-            slots[slot] = children[index];
+    // Of every child that has no slot yet, its best free one.
+    let mut wishes: Vec<_> = (0..children.len()).map(|k| best_of(k, &free)).collect();
+    while let Some((mut first, rest)) = wishes.split_first().map(|(wish, rest)| (*wish, rest)) {
+        for wish in rest {
+            if wish.0 > first.0 {
+                first = *wish;
+            }
+        }
+        let (_, index, slot) = first;
+        slots[slot] = children[index];
+        free[slot] = false;
+        wishes.retain(|wish| wish.1 != index);
+        for wish in wishes.iter_mut().filter(|wish| wish.2 == slot) {
+            *wish = best_of(wish.1, &free);
         }
     }
     slots
+}
+
+/// The bits of a number as an integer in the order of [`f32::total_cmp`].
+fn ordered(number: f32) -> i32 {
+    let bits = number.to_bits().cast_signed();
+    bits ^ (bits >> 31 & i32::MAX)
 }
