@@ -74,17 +74,16 @@ pub(crate) fn issues(traces: &[Option<Trace>], rule: Rule, line_bytes: u64) -> V
     loop {
         let begin = issues.len();
         let visiting = lanes.next_is(Kind::Node);
-        let mut testing = lanes.next_is(Kind::Triangle);
         issues.extend(lanes.issue(Kind::Node, &visiting));
-        if rule == Rule::Loop {
-            testing = lanes.next_is(Kind::Triangle);
-        }
-        while let Some(issue) = lanes.issue(Kind::Triangle, &testing) {
-            issues.push(issue);
-            testing = match rule {
-                Rule::Loop => lanes.next_is(Kind::Triangle),
-                Rule::IfIf => Vec::new(),
-            };
+        // The tests see what the visit found, as the second `if` of Aila and Laine (2009) does.
+        loop {
+            let testing = lanes.next_is(Kind::Triangle);
+            let issue = lanes.issue(Kind::Triangle, &testing);
+            let ends = issue.is_none() || rule == Rule::IfIf;
+            issues.extend(issue);
+            if ends {
+                break;
+            }
         }
         if issues.len() == begin {
             return issues;
@@ -130,9 +129,9 @@ mod tests {
         assert_eq!(told(&issues(&warp, Rule::Loop, 16)), expected);
         let expected = vec![
             (Node, 3, 12, vec![0]),
-            // Lane 1 visits while lanes 0 and 3 test: a turn of two issues.
-            (Node, 1, 4, vec![2]),
             (Triangle, 2, 8, vec![4]),
+            // Lane 1 visits before lane 0 tests again: a turn of two issues.
+            (Node, 1, 4, vec![2]),
             (Triangle, 1, 4, vec![5]),
             (Node, 1, 4, vec![1]),
         ];
