@@ -101,11 +101,14 @@ fn framed<T: Real>(apex: V3<T>, axis: V3<T>, tangent: T, near: T, narrow: T) -> 
     }
 }
 
-/// The tangent of the angle of a circular cone with a pixel's solid angle.
+/// The tangent of the angle of a circular cone with a pixel's solid angle Ω: its cosine is 1 − Ω / 2π.
 fn pixel_tangent<T: Angle>(camera: &Camera<T>, x: T, y: T) -> T {
     let far = (camera.distance * camera.distance + x * x + y * y).sqrt();
     // No product of three factors, whose order compilers of kernels choose.
-    (camera.distance * T::PART / far).sqrt() / far
+    let flat = (camera.distance * T::PART / far).sqrt() / far;
+    let square = flat * flat;
+    let (one, half, quarter) = (c::<T>(1.0), c::<T>(0.5), c::<T>(0.25));
+    flat * ((one - quarter * square).sqrt() / (one - half * square))
 }
 
 /// The cone off a mirror: wider by the curvature and by the lobe, its apex behind the mirror.

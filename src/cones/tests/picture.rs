@@ -51,6 +51,16 @@ fn world(place: Place, mirror: Option<Mirror>, gloss: f64) -> World {
     World::new(view(place, mirror, gloss), 1)
 }
 
+/// Sixteen pixels of eleven degrees.
+fn wide(place: Place, mirror: Option<Mirror>) -> World {
+    let view = View {
+        side: 4,
+        resolution: 4,
+        ..view(place, mirror, 0.0)
+    };
+    World::new(view, 1)
+}
+
 /// Views and what is kept that show all parts.
 fn cases() -> Vec<(World, Keep)> {
     let mean = Keep {
@@ -75,6 +85,10 @@ fn cases() -> Vec<(World, Keep)> {
         blend: Blend::Lobe,
         ..KEEP
     };
+    let all = Keep {
+        layers: 200,
+        ..KEEP
+    };
     vec![
         (world(Place::Checker, Some(Mirror::Sphere), 0.01), lobe),
         (world(Place::Thin, Some(Mirror::Plane), 0.003), lobe),
@@ -86,6 +100,8 @@ fn cases() -> Vec<(World, Keep)> {
         (world(Place::Checker, Some(Mirror::Sphere), 0.0), KEEP),
         (world(Place::Balls, Some(Mirror::Sphere), 0.1), mean),
         (world(Place::Thin, Some(Mirror::Plane), 0.05), count),
+        (wide(Place::Checker, None), all),
+        (wide(Place::Checker, Some(Mirror::Plane)), all),
     ]
 }
 
@@ -319,6 +335,34 @@ fn faults_of_a_picture_are_seen() {
         let mut found = twin.clone();
         plant(&mut found);
         assert!(check::near(&found, &expected).is_err(), "not seen: {name}");
+    }
+}
+
+#[test]
+fn a_cone_has_the_solid_angle_of_its_pixel_however_wide() {
+    for distance in [1000.0, 20.0, 4.0, 2.0] {
+        let camera = Camera::<f64> {
+            eye: V3::of(DVec3::X),
+            right: V3::of(DVec3::Y),
+            up: V3::of(DVec3::Z),
+            forward: V3::of(-DVec3::X),
+            distance,
+            stride: 1.0,
+            side: 4,
+            mirror: 0,
+            gloss: 0.0,
+            is_mean: false,
+        };
+        for (pixel, [x, y]) in [(0, [-1.5, 1.5]), (6, [0.5, 0.5]), (11, [1.5, -0.5])] {
+            let tangent = cone_of(&camera, pixel).tangent;
+            // A cap's, 2π (1 - cos), and that of a unit square seen aslant from this distance.
+            let cap = std::f64::consts::TAU * (1.0 - 1.0 / (1.0 + tangent * tangent).sqrt());
+            let square = distance / (distance * distance + x * x + y * y).powf(1.5);
+            assert!(
+                (cap / square - 1.0).abs() < 1e-9,
+                "{distance}, {pixel}: {cap}, not {square}"
+            );
+        }
     }
 }
 

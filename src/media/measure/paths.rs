@@ -189,7 +189,8 @@ struct Ready {
 impl Ready {
     fn new(at: &At, cell: &Cell, load: &Load, ball: Option<&Ball>) -> Result<Self, Absent> {
         let gpu = at.gpu(cell)?;
-        if load.rule == Rule::Fixed && load.step <= 0.0 {
+        let is_fixed = load.rule == Rule::Fixed || load.target == Target::Lens;
+        if is_fixed && load.step <= 0.0 {
             return Err(Absent::Refused(
                 "a fixed step of 0 never ends: give `step`".to_owned(),
             ));

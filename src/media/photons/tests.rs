@@ -126,6 +126,19 @@ fn warps_follow_their_map_and_keep_different_parts_of_the_order_of_points() {
     for wrong in [vec![1.0; 15], vec![1.0, 1.0, 0.0, 1.0], vec![1.0; 9]] {
         assert!(ImportanceMap::new(wrong).is_err());
     }
-    let none = map.warped(Warp::None, [0.3, 0.4]);
-    assert_eq!(none, [0.3, 0.4]);
+    assert_eq!(map.sent(Warp::None, [0.3, 0.4]), ([0.3, 0.4], 1.0));
+}
+
+#[test]
+fn parts_of_the_square_that_points_stand_for_make_up_all_of_it_whatever_sends_them() {
+    let side = 16;
+    let value = |i: usize| 0.1 + 5.0 * f64::from(u8::from(i % side < 5 && i / side > 8));
+    let map = ImportanceMap::new((0..side * side).map(value).collect()).unwrap();
+    let points = set(Points::Hammersley);
+    for warp in [Warp::None, Warp::Inversion, Warp::Alias, Warp::Hierarchical] {
+        // Each stands for 1 / (M density) of the square, whose area is 1.
+        let parts = points.iter().map(|point| 1.0 / map.sent(warp, *point).1);
+        let area = parts.sum::<f64>() / points.len() as f64;
+        assert!((area - 1.0).abs() < 5e-3, "{warp:?}: {area}");
+    }
 }

@@ -71,6 +71,16 @@ impl ImportanceMap {
         }
     }
 
+    /// The point to which a way of warping takes a point, and how dense points are there that were even: as dense as before
+    /// where they stay.
+    pub fn sent(&self, warp: Warp, at: [f64; 2]) -> ([f64; 2], f64) {
+        let to = self.warped(warp, at);
+        match warp {
+            Warp::None => (to, 1.0),
+            _ => (to, self.density(to)),
+        }
+    }
+
     fn row(&self, y: usize) -> &[f64] {
         &self.share[y * self.side..(y + 1) * self.side]
     }

@@ -23,8 +23,8 @@ impl Pipeline {
             Some(adaptive) => {
                 let piloted = self.run_pilots(&adaptive, passes)?;
                 let warped = |(point, density): &([f64; 2], f64)| {
-                    let at = piloted.map.warped(adaptive.warp, *point);
-                    (at, piloted.map.density(at) * density)
+                    let (at, times) = piloted.map.sent(adaptive.warp, *point);
+                    (at, times * density)
                 };
                 (self.points.iter().map(warped).collect(), Some(piloted))
             }

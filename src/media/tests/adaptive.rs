@@ -5,6 +5,7 @@ use super::pipeline::{LAMP, fog, medium, points};
 use super::segments::adapter;
 use crate::adaptive::{Adaptive, Filter, Pilots, Smoothing, importance};
 use crate::photons::{Points, Warp};
+use crate::pipeline::oracle::power_into;
 use crate::pipeline::{Pipeline, camera};
 use crate::scatter::{Adding, Strategy};
 use glam::DVec3;
@@ -57,6 +58,31 @@ fn photons_by_a_constant_importance_are_those_of_the_reference() {
             );
         }
     }
+}
+
+#[test]
+fn photons_that_no_map_sends_elsewhere_carry_the_power_of_even_ones() {
+    let Some(gpu) = adapter() else { return };
+    let volume = fog([16; 3]);
+    let medium = medium(&volume, "level-map");
+    let adding = Adding::new(Strategy::Fixed64, 0);
+    let set = points(Points::Hammersley, 64, 0);
+    let mut pipeline = Pipeline::new(&gpu, (&volume, &medium), adding, LAMP, set).unwrap();
+    pipeline.set_adaptive(Some(Adaptive {
+        warp: Warp::None,
+        edges: 0.3,
+        background: 0.1,
+        ..EVEN
+    }));
+    pipeline.render().unwrap();
+    let (_, _, map) = pipeline.pilots().unwrap();
+    assert!(map.greatest() > 2.0, "{}", map.greatest());
+    let energies = pipeline.photons().iter().map(|p| p.energy.as_dvec3());
+    let power: DVec3 = energies.sum();
+    // The lamp's intensity times the solid angle of the box.
+    let exact = power_into(&volume, &LAMP).unwrap();
+    let off = (power / exact - 1.0).abs().max_element();
+    assert!(off < 0.01, "{power}, not {exact}");
 }
 
 #[test]

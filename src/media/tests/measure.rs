@@ -35,6 +35,10 @@ step = 0.0
 target = "lens"
 [[integrator."media:paths"]]
 step = 0.0
+[[integrator."media:paths"]]
+target = "lens"
+rule = "region"
+step = 0.0
 [[integrator."media:photons"]]
 points = ["grid", "hammersley"]
 side = 64
@@ -63,9 +67,9 @@ fn an_experiment_of_media_needs_no_scene_and_leaves_its_figures() {
         ..RunOptions::default()
     };
     let summary = run(&experiment, &plan, &registries, &options).unwrap();
-    // A fixed step of 0 is refused.
+    // A fixed step of 0 is refused, and a lens has no other.
     let text = std::fs::read_to_string(options.out.join("records.jsonl")).unwrap();
-    assert_eq!((summary.failed, summary.skipped), (0, 1), "{text}");
+    assert_eq!((summary.failed, summary.skipped), (0, 2), "{text}");
     let lines: Vec<Line> = text
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())

@@ -221,10 +221,7 @@ fn photons_by_importance_weigh_less_where_they_are_many() {
     let map = ImportanceMap::new((0..64).map(value).collect()).unwrap();
     let volume = fog([16; 3]);
     let even = points(Points::Hammersley, 192, 0);
-    let warp = |(point, _): &([f64; 2], f64)| {
-        let at = map.warped(Warp::Hierarchical, *point);
-        (at, map.density(at))
-    };
+    let warp = |(point, _): &([f64; 2], f64)| map.sent(Warp::Hierarchical, *point);
     let warped: Vec<_> = even.iter().map(warp).collect();
     let unweighted = warped.iter().map(|(at, _)| (*at, 1.0)).collect();
     let error = |points| error_of_points(&gpu, &volume, "dda", points);

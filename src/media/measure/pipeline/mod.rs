@@ -10,7 +10,7 @@ mod tests;
 
 use super::{cells_of, declare};
 use crate::adaptive::{Adaptive, Filter, Mode, Smoothing, break_even};
-use crate::photons::{Order, Points, Warp, ordered, point_set};
+use crate::photons::{ImportanceMap, Order, Points, Warp, ordered, point_set};
 use crate::pipeline::{Generality, Mirror, PipelineError};
 use crate::scatter::{ScatterError, Strategy};
 use crate::voxels::VoxelError;
@@ -203,6 +203,14 @@ impl Load {
             warp: self.warp,
             seed,
         })
+    }
+
+    /// The greatest density of photons, which are as even as their points where nothing sends them elsewhere.
+    fn greatest_of(&self, map: &ImportanceMap) -> f64 {
+        match self.warp {
+            Warp::None => 1.0,
+            _ => map.greatest(),
+        }
     }
 
     /// True if points are sent to cells by a table, which undoes how even they are.

@@ -111,7 +111,7 @@ impl Ready {
             None => None,
             Some((pilots, _, map)) => Some(Piloted {
                 photons: pilots.len(),
-                density: map.greatest(),
+                density: load.greatest_of(map),
                 equal: equal(gpu, load, scene, seed)?,
             }),
         };
