@@ -2,7 +2,7 @@
 
 use super::arguments::{ValueArguments, of_flags, on_axis, one_cell};
 use super::output::{OutputArguments, screen, warn};
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Args;
 use raystone::advice::{
     AdviceTable, CLASSES, Demand, FEATURES, Prediction, Regret, Sample, SceneFeatures, Trial, fit,
@@ -28,7 +28,12 @@ pub struct Advise {
     #[arg(required_unless_present = "fit")]
     scene: Option<String>,
     /// Rays that the structure will answer
-    #[arg(long, default_value_t = 1e7, value_name = "N")]
+    #[arg(
+        long,
+        default_value_t = 1e7,
+        value_name = "N",
+        allow_negative_numbers = true
+    )]
     rays: f64,
     /// Class of these rays; may be given many times [default: all in equal parts]
     #[arg(long, value_parser = CLASSES)]
@@ -104,12 +109,11 @@ impl Advise {
 
     fn features(&self, scene: &str) -> Result<SceneFeatures> {
         let flags = on_axis(Axis::Scene, [&scene.to_owned()]);
-        let cell = one_cell(&of_flags(
-            "advise",
-            flags,
-            &self.values.set,
-            &Registries::default(),
-        )?)?;
+        let set = &self.values.set;
+        // The scene is no flag here.
+        let experiment = of_flags("advise", flags, set, &Registries::default());
+        let experiment = experiment.map_err(|e| anyhow!(e.to_string().replace("--scene: ", "")))?;
+        let cell = one_cell(&experiment)?;
         let options = LoadOptions {
             textures: false,
             allow_outside: self.values.allow_outside,

@@ -121,12 +121,12 @@ pub fn of_flags(
 }
 
 /// Returns a message about flags that are read as overrides with the flags in their place.
-fn as_typed(message: String, flags: &[String]) -> String {
+pub fn as_typed(message: String, flags: &[String]) -> String {
     let named = |text: String, flag: &String| {
         let key = flag.split('=').next().unwrap_or_default();
         let typed = match key.split_once('.') {
             Some(("run", "resolution")) => "size",
-            Some(("axes" | "run", name)) => name,
+            Some(("axes" | "run" | "gate" | "stress", name)) => name,
             _ => return text,
         };
         text.replace(&format!("--set {flag}"), &format!("--{typed}"))

@@ -67,6 +67,12 @@ impl Render {
         check_output(&self.output)?;
         if let Some(preview) = &self.preview {
             check_output(preview)?;
+            if *preview == self.output {
+                bail!(
+                    "--preview {}: this is the picture of --output, too",
+                    preview.display()
+                );
+            }
         }
         let registries = Registries::default();
         let experiment = of_flags("render", self.flags(), &self.values.set, &registries)?;

@@ -1,10 +1,10 @@
 //! `raystone stress`.
 
-use super::arguments::{DeviceArguments, ValueArguments, listed, on_axis, plan, warn_of};
+use super::arguments::{DeviceArguments, ValueArguments, as_typed, listed, on_axis, plan, warn_of};
 use super::faults::plant_faults;
 use super::output::OutputArguments;
 use super::run::carry_out;
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use raystone::config::expect::Thesis;
 use raystone::config::{Axis, Experiment, STRESS};
@@ -40,7 +40,12 @@ pub struct Stress {
     #[arg(long, value_name = "N")]
     shots: Option<u32>,
     /// Seed of everything random
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        allow_negative_numbers = true
+    )]
     seed: u32,
     /// A model to shoot at from inside, its holes closed [default: none]
     #[arg(long, value_name = "FILE")]
@@ -92,7 +97,8 @@ impl Stress {
         let registries = raystone::registries();
         let overrides = self.overrides()?;
         let catalogue = registries.catalogue();
-        let experiment = Experiment::parse(EXPERIMENT, FILE, &overrides, &catalogue)?;
+        let experiment = Experiment::parse(EXPERIMENT, FILE, &overrides, &catalogue)
+            .map_err(|error| anyhow!(as_typed(error.to_string(), &overrides)))?;
         let plan = plan(&experiment, &[], &registries)?;
         let values = ValueArguments {
             set: Vec::new(),

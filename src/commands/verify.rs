@@ -1,11 +1,13 @@
 //! `raystone verify`.
 
-use super::arguments::{DeviceArguments, ExperimentArguments, listed, of_flags, on_axis, plan};
+use super::arguments::{
+    DeviceArguments, ExperimentArguments, as_typed, listed, of_flags, on_axis, plan,
+};
 use super::failure::{BAD_INPUT, FAILED};
 use super::output::{OutputArguments, screen, tell};
 use super::verify_images;
 use super::verify_others::{Others, verify_others};
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use clap::Args;
 use raystone::config::{Axis, Cell, Experiment, Plan, Skipped};
 use raystone::measure::record::{
@@ -67,11 +69,13 @@ impl Verify {
         if self.images {
             return verify_images::execute(&registries, &self.device, &self.experiment.values);
         }
-        let (flags, set) = (self.flags(), &self.experiment.values.set);
+        let (typed, set) = (Vec::from_iter(self.flags()), &self.experiment.values.set);
+        let flags = typed.iter().cloned();
         let experiment = match &self.file {
             Some(file) => {
                 let overrides: Vec<String> = flags.chain(set.iter().cloned()).collect();
-                Experiment::load(file, &overrides, &registries.catalogue())?
+                Experiment::load(file, &overrides, &registries.catalogue())
+                    .map_err(|error| anyhow!(as_typed(error.to_string(), &typed)))?
             }
             None => of_flags("verify", all(&registries).chain(flags), set, &registries)?,
         };

@@ -4,6 +4,7 @@ mod checks;
 mod exports;
 mod fixture;
 mod gallery;
+mod idea;
 mod names;
 mod pages;
 mod rendering;

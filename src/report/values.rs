@@ -8,12 +8,13 @@ use super::sections::{
     animation, compactions, kernels, organisations, peers, structures, trade_off, verdict::Race,
 };
 use raystone_core::text::escape::visible;
-use raystone_record::figure::{self, Figure};
+use raystone_record::figure::{self, Figure, Spread};
 use raystone_record::{
     BiasRecord, CellRecord, Interval, Key, MeasuredRecord, Ran, Recorded, ReferenceRecord, Samples,
     StreamRecord, StructureRecord, axis,
 };
 use raystone_stats::comparison::LogFigure;
+use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 
@@ -134,6 +135,20 @@ impl<'a> Value<'a> {
             }
         };
         self
+    }
+
+    /// Describes its interval: that of the figure, but for a median of rounds too few for one.
+    pub(crate) fn spread_words(&self) -> Cow<'static, str> {
+        let spread = self.figure.spread;
+        match &self.source.samples {
+            Samples::Rounds { adapter, .. }
+                if spread == Spread::Median && adapter.len() < LEAST_FOR_MEDIAN =>
+            {
+                let bounds = format::median_bounds(std::iter::once(adapter.len()));
+                format!("median, {bounds}").into()
+            }
+            _ => spread.words().into(),
+        }
     }
 
     /// Returns its logarithm with the noise of its parts, round by round or group by group, where these are known.
@@ -352,13 +367,13 @@ pub fn csv(values: &[Value]) -> String {
         "figure", "title", "unit", "value", "low", "high", "interval",
     ];
     let mut text = line(axes.iter().chain(&named).map(|head| (*head).to_owned()));
-    for Value {
-        key,
-        figure,
-        estimate,
-        ..
-    } in values
-    {
+    for value in values {
+        let Value {
+            key,
+            figure,
+            estimate,
+            ..
+        } = value;
         let numbers = match estimate {
             Estimate::Known(i) | Estimate::HeavyTailed(i) => {
                 [i.value, i.low, i.high].map(|x| x.to_string())
@@ -370,9 +385,9 @@ pub fn csv(values: &[Value]) -> String {
             Estimate::Word(word) => (*word).to_owned(),
             Estimate::HeavyTailed(_) => format!(
                 "{}, not to be trusted: {HEAVY_TAILED}",
-                figure.spread.words()
+                value.spread_words()
             ),
-            _ => figure.spread.words().to_owned(),
+            _ => value.spread_words().into_owned(),
         };
         let labels = axes.iter().map(|axis| no_formula(key.label(axis)));
         let row = [&figure.id, &figure.title, &figure.unit].map(ToString::to_string);
@@ -451,6 +466,38 @@ fn line(fields: impl Iterator<Item = String>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_median_of_few_rounds_is_told_with_a_range() {
+        let of = |rounds: usize, figure| {
+            let known = Interval {
+                value: 2.0,
+                low: 1.0,
+                high: 3.0,
+            };
+            let mut value = Value::new(&Key::default(), figure, known);
+            value.source.samples = Samples::Rounds {
+                adapter: vec![2.0; rounds],
+                wall: Vec::new(),
+                processors: Vec::new(),
+            };
+            value
+        };
+        let told = |value: Value| csv(&[value]).lines().nth(1).map(str::to_owned);
+        let range = "range of 5 samples, 6 are needed for a 95 % interval";
+        assert_eq!(
+            told(of(5, &figure::MRAYS_PER_S)),
+            Some(format!(
+                "mrays-per-s/v1,speed,Mrays/s,2,1,3,\"median, {range}\""
+            ))
+        );
+        let enough = of(6, &figure::MRAYS_PER_S);
+        assert_eq!(enough.spread_words(), Spread::Median.words());
+        assert_eq!(
+            of(5, &figure::BREAK_EVEN).spread_words(),
+            figure::BREAK_EVEN.spread.words()
+        );
+    }
 
     #[test]
     fn a_line_of_the_export_holds_every_axis_and_quotes_what_needs_it() {

@@ -6,6 +6,7 @@ use raystone_accel::oracle::exact_truths;
 use raystone_accel::watch::{Event, watch};
 use raystone_accel::{AccelKind, BuiltAccel, Counters, Hit, NO_HIT, Ray, Space, TriangleSoup};
 use raystone_core::params::Params;
+use raystone_core::text::did_you_mean_or_known;
 use raystone_scene::SceneData;
 use std::fmt::Write as _;
 
@@ -120,12 +121,22 @@ pub fn scene_of(address: &super::case::Address) -> Result<SceneData, String> {
         return Ok(super::case::scene(mesh, None));
     }
     let (name, label) = (&address.family, &address.label);
-    let family = super::families::Family::named(name)
-        .ok_or_else(|| format!("there is no family `{name}`; `raystone stress` lists them"))?;
-    let mut cases = family.cases(address.seed, false, 0).into_iter();
-    let found = cases.find(|case| case.label == *label);
-    let found = found.ok_or_else(|| format!("family {name} has no case `{label}`"))?;
-    Ok(found.scene)
+    let family = super::families::Family::named(name).ok_or_else(|| {
+        let known: Vec<&str> = super::family_names().collect();
+        let near = did_you_mean_or_known(name, &known);
+        format!("there is no family `{name}`{near}")
+    })?;
+    let mut cases = family.cases(address.seed, false, 0);
+    let Some(at) = cases.iter().position(|case| case.label == *label) else {
+        // Labels have commas.
+        let known = cases.iter().map(|case| format!("`{}`", case.label));
+        let known: Vec<String> = known.collect();
+        let known = known.join(", ");
+        return Err(format!(
+            "family {name} has no case `{label}`; known: {known}"
+        ));
+    };
+    Ok(cases.swap_remove(at).scene)
 }
 
 #[cfg(test)]

@@ -774,6 +774,32 @@ fn lists_name_only_what_exists() {
     }
 }
 
+/// docs/adding-a-structure.md says so.
+#[test]
+fn structures_of_the_package_need_no_import_but_the_prelude() {
+    let braced = |text: &str, from: &str| {
+        let inside = text.split(from).nth(1).unwrap_or_else(|| panic!("{from}"));
+        let names = inside.split('}').next().unwrap_or_default();
+        let names = names.split(|c: char| !(c.is_alphanumeric() || c == '_'));
+        BTreeSet::from_iter(names.filter(|name| !name.is_empty()).map(str::to_owned))
+    };
+    let shared = read(&root().join("src/accel/structure.rs"));
+    let prelude = shared.split("mod prelude {").nth(1).expect("the prelude");
+    let prelude = prelude.split("\n}").next().expect("its end");
+    let example = read(&root().join("tests/device/adding_a_structure/sorted_slabs.rs"));
+    let mut needed = braced(&example, "use raystone::accel::{");
+    needed.extend(braced(&example, "use raystone::accel::twin::{"));
+    needed.extend(["Bounds", "parameters"].map(str::to_owned));
+    assert!(needed.len() > 10, "{needed:?}");
+    let has = |name: &String| {
+        prelude
+            .split(|c: char| !(c.is_alphanumeric() || c == '_'))
+            .any(|word| word == name)
+    };
+    let missing: Vec<&String> = needed.iter().filter(|name| !has(name)).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
 #[test]
 fn every_function_of_a_kernel_has_a_twin_of_the_same_name_and_the_other_way_round() {
     let mut compared = 0;

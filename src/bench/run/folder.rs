@@ -130,8 +130,8 @@ impl Folder {
         let replaces = matches!(existing, Existing::Replace | Existing::Resume);
         if !replaces && let Some(found) = results.chain(is_left_over.then_some(left_over)).next() {
             return Err(Refusal::Taken(format!(
-                "{} holds the results of another run; choose another folder with --out, let --number \
-                 number it, or replace them with --force",
+                "{} holds the results of another run; go on with them by --resume, choose another folder with \
+                 --out, let --number number it, or replace them with --force",
                 found.display()
             )));
         }

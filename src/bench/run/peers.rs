@@ -136,7 +136,7 @@ fn timing(
     samples: Result<Samples, GpuError>,
 ) -> Result<Option<PeerTiming>, String> {
     let (set, text) = (timed.set, |error: GpuError| error.to_string());
-    let wrong = |reason: String| format!("{:?} rays: {reason}", set.class);
+    let wrong = |reason: String| format!("{} rays: {reason}", set.class.name());
     if let Some(fault) = timed.watch.fault() {
         return Err(wrong(fault));
     }

@@ -231,7 +231,7 @@ fn class_timing(
     let exact = world.probe.is_exact();
     let fault = (item.rays).fault(set, &world.soup, one.traced.space, exact);
     if let Some(fault) = fault.map_err(text)? {
-        return Err(format!("{:?} rays: {fault}", set.class).into());
+        return Err(format!("{} rays: {fault}", set.class.name()).into());
     }
     let samples = samples.map_err(text)?;
     if gpu.has_clock() && !samples.ms.is_empty() && samples.ms == samples.wall_ms {
@@ -246,7 +246,7 @@ fn class_timing(
         return Err(text.to_owned().into());
     }
     if let Some(slow) = slow_slice(item.rays.batch.longest_slice_ms()) {
-        session.tell_warning(&format!("{}, {:?} rays: {slow}", one.cell, set.class));
+        session.tell_warning(&format!("{}, {} rays: {slow}", one.cell, set.class.name()));
     }
     let mut empties = session
         .clock
@@ -262,8 +262,9 @@ fn class_timing(
     let mut empty = median(&empties).unwrap_or(0.0);
     if is_hidden(&samples.ms, empty) {
         session.tell_warning(&format!(
-            "{}, {:?} rays: a dispatch of nothing takes as long ({empty:.3} ms), and is in their time: they are at least as fast as shown; raise timing.rays",
-            one.cell, set.class
+            "{}, {} rays: a dispatch of nothing takes as long ({empty:.3} ms), and is in their time: they are at least as fast as shown; raise timing.rays",
+            one.cell,
+            set.class.name()
         ));
         (empties, empty) = (Vec::new(), 0.0);
     }

@@ -34,7 +34,13 @@ pub struct SamplerArguments {
     #[arg(value_parser = clap::value_parser!(u32).range(1..=8192))]
     pub(super) width: u32,
     /// Seed
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "sequence")]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        requires = "sequence",
+        allow_negative_numbers = true
+    )]
     pub(super) seed: u32,
     /// Parameter of the sequence or the decorrelation (of both, if both have it): `--param digits=faure`
     #[arg(long, value_name = "KEY=VALUE", requires = "sequence")]

@@ -351,14 +351,22 @@ fn decide(finding: &mut Finding, rejected: bool) {
     }
 }
 
-/// Returns the values as shown; exact ones that differ only in digits that tables omit have all digits.
+/// Returns the values as shown; exact ones that differ only in digits that tables omit have as many as tell them apart.
 fn shown(old: &Taken, new: &Taken) -> [String; 2] {
     match (&old.evidence, &new.evidence) {
         (Evidence::Exact(a), Evidence::Exact(b)) if a != b && old.shown == new.shown => {
-            [a, b].map(f64::to_string)
+            told_apart([*a, *b])
         }
         _ => [old, new].map(|taken| taken.shown.clone()),
     }
+}
+
+/// Returns two numbers with as few digits as tell them apart, at least four.
+fn told_apart(pair: [f64; 2]) -> [String; 2] {
+    let rounded = |x: f64, after: usize| format!("{x:.after$e}").parse().unwrap_or(x);
+    let with = |after| pair.map(|x: f64| f64::to_string(&rounded(x, after)));
+    let told = (3..16).map(with).find(|[a, b]| a != b);
+    told.unwrap_or_else(|| pair.map(|x| x.to_string()))
 }
 
 fn exact_change(old: &Evidence, new: &Evidence) -> Option<f64> {

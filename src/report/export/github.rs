@@ -21,7 +21,7 @@ fn of_direction(source: &Source, direction: Better) -> Exported {
             "name": name(&figure.id, &number.value.key),
             "unit": figure.unit,
             "value": number.at,
-            "extra": format!("{} ({})", figure.title, figure.spread.words()),
+            "extra": format!("{} ({})", figure.title, number.value.spread_words()),
         });
         if let Some([low, high]) = number.bounds {
             entry["range"] = json!(format!("{low} to {high}"));

@@ -7,6 +7,7 @@ use crate::markdown;
 use crate::pivot::Rows;
 use crate::values::{Estimate, Value};
 use raystone_record::{Key, axis};
+use std::borrow::Cow;
 
 /// Axes suitable as columns, the best first.
 const ACROSS: [&str; 4] = [axis::RAYS, axis::SPP, axis::POINTS, axis::SUBJECT];
@@ -46,12 +47,13 @@ fn table(values: &[Value]) -> Table {
     let heads: Vec<String> = by.iter().map(|axis| format!(":{axis}")).collect();
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     let figure = &values[0].figure;
-    let known = values.iter().any(
-        |v| matches!(v.estimate, Estimate::Known(i) | Estimate::HeavyTailed(i) if i.low < i.high),
-    );
-    let spread = if known { figure.spread.words() } else { "" };
+    let has_width = |v: &&Value| matches!(v.estimate, Estimate::Known(i) | Estimate::HeavyTailed(i) if i.low < i.high);
+    // The caption holds for all, also for those of few rounds.
+    let spreads = values.iter().filter(has_width).map(Value::spread_words);
+    let weakest = |spread: &Cow<str>| *spread == figure.spread.words();
+    let spread = spreads.min_by_key(weakest).unwrap_or_default();
     let shared = values[0].key.only(&shared).to_string();
-    let parts = [figure.heading(), shared, spread.to_owned()];
+    let parts = [figure.heading(), shared, spread.into_owned()];
     let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
     let part = |key: &Key| across.map_or(String::new(), |axis| key.label(axis).to_owned());
     Rows::of_labels(&by, &heads, values).table(values, parts.join("; "), &[figure], &part)

@@ -38,7 +38,8 @@ pub(crate) fn against_original(data: &RunData) -> Vec<(Table, Vec<String>)> {
         let caption = format!("What the kernels @{idea} change, against {original}");
         let heads = ["structure", ":answer", ":change [95 % interval]"];
         let table = Table::of(caption, &heads, structures(data, &found));
-        let mut notes = found.notes.clone();
+        let mut notes = Vec::from_iter(how_times(&found));
+        notes.extend(found.notes.iter().cloned());
         notes.push(beside_times(&found));
         Some((table, notes)).filter(|(table, _)| !table.rows.is_empty())
     };
@@ -153,6 +154,16 @@ fn change_of(finding: &Finding) -> String {
     format!("{of}: {} {change}", finding.figure.title)
 }
 
+/// Says what the changes of times are of: the speeds of other tables may be by another clock.
+fn how_times(found: &Comparison) -> Option<String> {
+    let changed = found.findings.iter().filter(|f| f.is_time && !f.is_control);
+    let whys = changed
+        .filter(|f| f.measured.is_some())
+        .map(|f| f.why.clone());
+    let whys = without_repeats(whys.collect());
+    (!whys.is_empty()).then(|| format!("the changes are of: {}", whys.join("; ")))
+}
+
 /// Counts the figures beside times that are not the same.
 fn beside_times(found: &Comparison) -> String {
     let others = || found.findings.iter().filter(|f| !f.is_time);
@@ -166,19 +177,29 @@ fn beside_times(found: &Comparison) -> String {
     format!("{of}; `raystone compare` on this run lists all.")
 }
 
+/// Returns `true` if a measurement repeats another, see [`repeats`].
+pub(crate) fn is_repeat<T>(one: &Measured<T>, all: &[Measured<T>]) -> bool {
+    repeats((&one.key, one.ran), all.iter().map(|of| (&of.key, of.ran)))
+}
+
 /// Returns `true` if a measurement repeats another: the same but for the label of its kernels, which are equal to the letter.
 /// In a contest it would be a rival of itself.
-pub(crate) fn is_repeat<T>(one: &Measured<T>, all: &[Measured<T>]) -> bool {
+pub(crate) fn repeats<'a>(
+    (key, ran): (&Key, &Ran),
+    all: impl IntoIterator<Item = (&'a Key, &'a Ran)>,
+) -> bool {
     let bare = |key: &Key| key.clone().with(axis::KERNELS, "");
-    let is_embedded = |of: &Measured<T>| of.key.label(axis::KERNELS).is_empty();
-    let hash = &one.ran.kernel_hash;
-    if hash.is_empty() || is_embedded(one) {
+    let is_embedded = |key: &Key| key.label(axis::KERNELS).is_empty();
+    if ran.kernel_hash.is_empty() || is_embedded(key) {
         return false;
     }
-    let at = all.iter().position(|other| other.key == one.key);
-    all.iter().enumerate().any(|(place, other)| {
-        let is_before = is_embedded(other) || at.is_some_and(|at| place < at);
-        is_before && other.ran.kernel_hash == *hash && bare(&other.key) == bare(&one.key)
+    let is_same =
+        |of: &Key, with: &Ran| with.kernel_hash == ran.kernel_hash && bare(of) == bare(key);
+    let all: Vec<_> = all.into_iter().collect();
+    let own = all.iter().position(|(of, _)| *of == key);
+    all.iter().enumerate().any(|(place, (of, with))| {
+        let is_before = is_embedded(of) || own.is_some_and(|own| place < own);
+        is_before && is_same(of, with)
     })
 }
 

@@ -61,7 +61,7 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
             "Size, shape and further figures",
             vec![
                 SHAPE.table(names, &values, &[]),
-                LEAF_SIZES.table(names, &values, &[]),
+                leaf_table(names, &values),
                 outside_table(data, scene, &values),
             ],
         ),
@@ -80,6 +80,26 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
     let maps = heat_maps(dir, scene).into_iter().collect();
     blocks.extend(Block::fold("Where rays cost most: heat maps", maps));
     blocks
+}
+
+/// Returns the table of leaves by size, the classes of sizes in their order whichever structure has them first.
+fn leaf_table(names: &Names, values: &[Value]) -> Table {
+    let mut table = LEAF_SIZES.table(names, values, &[]);
+    // The least number of references of the class; columns before the classes have none, and stay in front.
+    let class = |title: &str| -> Option<u32> {
+        title
+            .split(|c: char| !c.is_ascii_digit())
+            .next()?
+            .parse()
+            .ok()
+    };
+    let mut order: Vec<usize> = (0..table.columns.len()).collect();
+    order.sort_by_key(|&at| class(&table.columns[at].title));
+    table.columns = order.iter().map(|&at| table.columns[at].clone()).collect();
+    for row in &mut table.rows {
+        *row = order.iter().map(|&at| row[at].clone()).collect();
+    }
+    table
 }
 
 fn speed_bounds(scene: &SceneGroup) -> String {

@@ -77,8 +77,18 @@ pub(crate) fn break_even_table(names: &Names, scene: &SceneGroup, values: &[Valu
 
 /// Returns the sampler that most structures were timed with.
 fn most_timed<'a>(view: &'a View) -> Option<&'a MeasuredSampler<'a>> {
-    let timed = |s: &&MeasuredSampler| view.valid_times().filter(|t| t.sampler == s.name).count();
+    let timed = |s: &&MeasuredSampler| timed_with(view, s).count();
     view.samplers.iter().rev().max_by_key(timed)
+}
+
+/// Returns the times of cells with this sampler, whichever kernels they ran with.
+fn timed_with<'a>(
+    view: &'a View,
+    sampler: &'a MeasuredSampler,
+) -> impl Iterator<Item = &'a Measured<'a, TimeRecord>> {
+    let axes = [axis::SEQUENCE, axis::DECORRELATION, axis::OFFSET];
+    let times = view.valid_times();
+    times.filter(move |time| time.key.agrees(&sampler.key, &axes))
 }
 
 /// Returns times of build and rendering together with that sampler, for one image of few samples and one of many.
@@ -101,8 +111,7 @@ pub(crate) fn times_to_image(scene: &SceneGroup, view: &View) -> Vec<Value<'stat
         };
         Some(counts.iter().map(total).collect::<Vec<_>>())
     };
-    let timed = view.valid_times().filter(|t| t.sampler == sampler.name);
-    timed.filter_map(of).flatten().collect()
+    timed_with(view, sampler).filter_map(of).flatten().collect()
 }
 
 /// Returns the table of [`times_to_image`].

@@ -1,6 +1,6 @@
 //! The question of the run, the winners, the failures, and the state of the checks.
 
-use super::kernels::{self, is_repeat};
+use super::kernels::{self, is_repeat, repeats};
 use super::{belief, compactions, rendering, run, targets};
 use crate::data::{Measured, RAYS, RunData, SceneGroup, View, grouped, without_repeats};
 use crate::document::*;
@@ -314,7 +314,8 @@ fn rule(data: &RunData) -> String {
     format!(
         "A winner is named only where it differs from every other: by a test of their ratio, of times round by round where \
          both were timed in the same rounds, with the noise of images, reference and times together, at 5 % for all pairs of a question (Holm's correction). Where a question \
-         stays undecided, those are named that do not differ from the best. {} made in {}.",
+         stays undecided, those are named that do not differ from the best. Ratios of times are those of the rounds: on a \
+         busy machine the medians beside them may have another ratio, or another order. {} made in {}.",
         format::plural(compared().sum(), "comparison"),
         format::plural(questions, "question")
     )
@@ -403,7 +404,9 @@ fn point_sets(data: &RunData) -> Vec<(String, Ruling)> {
     let pairs = without_repeats(pairs.collect()).into_iter();
     let rule_on = |pair: String| {
         let of_pair = named.iter().filter(|s| s.pair() == pair);
-        let of_pair: Vec<&&Recorded<StreamRecord>> = of_pair.collect();
+        let mut of_pair: Vec<&&Recorded<StreamRecord>> = of_pair.collect();
+        let ran: Vec<_> = of_pair.iter().map(|s| (s.key, s.ran)).collect();
+        of_pair.retain(|s| !repeats((s.key, s.ran), ran.iter().copied()));
         let has = |n: usize| of_pair.iter().all(|s| s.star.iter().any(|at| at.n == n));
         let counts = of_pair.first()?.star.iter().rev().map(|at| at.n);
         let n = { counts }.find(|n| has(*n))?;

@@ -92,6 +92,68 @@ fn an_unknown_structure_or_scene_ends_with_2_and_the_nearest_name() {
 }
 
 #[test]
+fn a_value_that_is_refused_is_named_as_it_was_typed() {
+    let trace = |scene: &'static str| ["trace", "--ray", "0 0 1 0 0 1", "--scene", scene];
+    let (family, label) = (trace("stress:needle:x:1"), trace("stress:needles:x:1"));
+    let cases: [(&[&str], &str); 9] = [
+        (
+            &["verify", "--rays", "1"],
+            "error: --rays: `gate.rays` = 1 ",
+        ),
+        (
+            &["verify", "tests/data/tiny.toml", "--rays", "1"],
+            "error: --rays: `gate.rays` = 1 ",
+        ),
+        (
+            &["stress", "--rays", "0"],
+            "error: --rays: `stress.rays` = 0 ",
+        ),
+        (&["advise", "cornel-box"], "error: unknown scene "),
+        (
+            &["advise", "cornell-box", "--rays", "-3"],
+            "error: --rays -3: ",
+        ),
+        (
+            &[
+                "points",
+                "--sequence",
+                "sobol",
+                "--count",
+                "4",
+                "--seed",
+                "-1",
+            ],
+            "error: invalid value '-1' ",
+        ),
+        (
+            &[
+                "render",
+                "--order",
+                "blocks",
+                "-o",
+                "one.png",
+                "--preview",
+                "one.png",
+            ],
+            "error: --preview one.png: ",
+        ),
+        // What there is follows: `raystone stress` would run it all.
+        (
+            &family,
+            "error: --scene: there is no family `needle`; did you mean `needles`?",
+        ),
+        (
+            &label,
+            "error: --scene: family needles has no case `x`; known: `scattered, ",
+        ),
+    ];
+    for (arguments, expected) in cases {
+        let message = error(&run(arguments), 2);
+        assert!(message.starts_with(expected), "{arguments:?}: {message}");
+    }
+}
+
+#[test]
 fn a_missing_file_ends_with_2_and_its_name() {
     let message = error(&run(&["run", "no/such.toml"]), 2);
     assert!(message.contains("no/such.toml"), "{message}");

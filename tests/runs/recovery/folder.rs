@@ -78,7 +78,9 @@ fn results_of_another_run_are_kept_unless_force_replaces_them() {
     assert_eq!(refused.status.code(), Some(2));
     let words = stderr(&refused);
     assert!(
-        words.contains("records.jsonl") && words.contains("--force"),
+        ["records.jsonl", "--resume", "--number", "--force"]
+            .iter()
+            .all(|word| words.contains(word)),
         "{words}"
     );
 
