@@ -13,7 +13,8 @@ use raystone::measure::record::read_records;
 use raystone::report::data::RunData;
 use raystone::report::{failed_checks, write_report};
 use raystone::run::{
-    Cost, Existing, Kernels, Registries, RunError, RunOptions, RunSummary, render_references,
+    Cost, Existing, Kernels, Registries, RunError, RunOptions, RunSummary, check_reference,
+    render_references,
 };
 use raystone::store::user_folder;
 use serde_json::json;
@@ -118,6 +119,7 @@ impl Run {
         let plan = plan(&experiment, &self.experiment.only, &registries)?;
         if self.dry_run {
             Kernels::load(&plan.kernels, &registries)?;
+            check_reference(&experiment)?;
             let units = registries.measurements.units(&experiment, &plan);
             let cost = Cost::new(&experiment, &plan, &registries.integrators);
             let cells = plan.describe();

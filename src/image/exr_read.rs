@@ -31,7 +31,7 @@ pub(super) fn read_exr(bytes: &[u8]) -> Result<Image, String> {
         .enumerate()
         .flat_map(|(place, layer)| colours(layer, (layers.len() > 1).then_some(place)))
         .collect();
-    let colours = chosen(&candidates).ok_or_else(|| no_picture(&candidates, layers))?;
+    let colours = chosen(&candidates)?.ok_or_else(|| no_picture(&candidates, layers))?;
     let window = found.attributes.display_window;
     let [width, height] = checked_size(window.size.x() as u64, window.size.y() as u64)?;
     let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
@@ -73,6 +73,8 @@ fn colours(layer: &FlatLayer, place: Option<usize>) -> Vec<Colours<'_>> {
     let list = &layer.channel_data.list;
     let names: Vec<String> = list.iter().map(|c| c.name.to_string()).collect();
     let mut prefixes: Vec<&str> = names.iter().map(|name| split(name).0).collect();
+    // Channels of other layers may stand between those without any.
+    prefixes.sort_unstable();
     prefixes.dedup();
     let part = layer.attributes.layer_name.as_ref();
     let part = part.filter(|_| place.is_some()).map(ToString::to_string);
@@ -102,19 +104,34 @@ fn colours(layer: &FlatLayer, place: Option<usize>) -> Vec<Colours<'_>> {
     prefixes.into_iter().filter_map(of_prefix).collect()
 }
 
-fn chosen<'a, 'b>(candidates: &'b [Colours<'a>]) -> Option<&'b Colours<'a>> {
-    let called = |wanted: &&str| {
+/// What Blender calls the picture that is made of its view layers.
+const COMPOSITE: &str = "Composite.Combined";
+
+/// The picture, if one is known by its name or place.
+///
+/// # Errors
+/// Several of one part have the same name, as those of view layers.
+fn chosen<'a, 'b>(candidates: &'b [Colours<'a>]) -> Result<Option<&'b Colours<'a>>, String> {
+    for wanted in PICTURE_LAYERS {
         let is_it = |c: &&Colours| split(&c.name).1.eq_ignore_ascii_case(wanted);
-        candidates.iter().find(is_it)
-    };
-    let known = PICTURE_LAYERS.iter().find_map(called);
+        let Some(first) = candidates.iter().find(is_it) else {
+            continue;
+        };
+        let of_part = |c: &&Colours| is_it(c) && std::ptr::eq(c.layer, first.layer);
+        let alike: Vec<_> = candidates.iter().filter(of_part).collect();
+        let composite = alike.iter().find(|c| c.name == COMPOSITE);
+        if let Some(picture) = composite.or(alike.first().filter(|_| alike.len() == 1)) {
+            return Ok(Some(picture));
+        }
+        let names: Vec<&str> = alike.iter().map(|c| c.name.as_str()).collect();
+        let names = names.join(", ");
+        return Err(format!(
+            "its layers {names} are pictures alike: save the one that is meant alone"
+        ));
+    }
     // Programs that know of one part only read the first.
-    let first = || {
-        candidates
-            .first()
-            .filter(|c| candidates.len() == 1 || c.is_first_part)
-    };
-    known.or_else(first)
+    let first = candidates.first();
+    Ok(first.filter(|c| candidates.len() == 1 || c.is_first_part))
 }
 
 fn no_picture(candidates: &[Colours], layers: &[FlatLayer]) -> String {
@@ -216,8 +233,19 @@ mod tests {
             Ok(plain),
             "no name is first"
         );
+        let depth = [alpha.clone(), vec![("Z".to_owned(), 9.0)]].concat();
+        assert_eq!(colour_of(&with(depth, "Normal", 3.0)), Ok(plain));
         let blender = with(of_layer("View.Normal", 3.0), "View.Combined", 1.0);
         assert_eq!(colour_of(&blender), Ok(plain));
+        let views = with(of_layer("Back.Combined", 3.0), "Front.Combined", 1.0);
+        let composed = with(views.clone(), "Composite.Combined", 1.0);
+        let composed = [composed, of_layer("AO.Combined", 4.0)].concat();
+        assert_eq!(colour_of(&composed), Ok(plain));
+        let views = colour_of(&views).unwrap_err();
+        assert!(
+            views.contains("Back.Combined, Front.Combined are pictures alike"),
+            "{views}"
+        );
         let only = [of_layer("diffuse", 1.0), vec![("depth.Z".to_owned(), 9.0)]].concat();
         assert_eq!(colour_of(&only), Ok(plain), "the only one with colours");
         assert_eq!(colour_of(&[("Y".to_owned(), 0.5)]), Ok([0.5; 3]));

@@ -16,7 +16,7 @@ pub use color::*;
 pub use exr_file::Attribute;
 pub use formats::*;
 pub use picture::*;
-pub use primaries::{is_cube_map, other_primaries};
+pub use primaries::{is_cube_map, other_primaries, primaries_note};
 pub use read::{read_linear, read_npy_array};
 
 use std::io;

@@ -28,6 +28,16 @@ pub fn other_primaries(path: &Path) -> Option<[f32; 8]> {
     (!pairs.all(|(x, known)| (x - known).abs() <= SAME)).then_some(found)
 }
 
+/// Says so where the colours of a file have [other primaries](other_primaries) than those that they are taken for.
+pub fn primaries_note(path: &Path) -> Option<String> {
+    let [rx, ry, gx, gy, bx, by, wx, wy] = other_primaries(path)?;
+    Some(format!(
+        "{}: its colours have the primaries ({rx}, {ry}), ({gx}, {gy}), ({bx}, {by}) and the white ({wx}, {wy}); they are \
+         taken for those of Rec. 709",
+        path.display()
+    ))
+}
+
 /// True for an OpenEXR file whose `envmap` says that it has the six sides of a cube, as `exrenvmap` writes by default.
 #[cfg(feature = "exr")]
 pub fn is_cube_map(path: &Path) -> bool {

@@ -187,7 +187,7 @@ pub fn read_npy_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f32>), String> {
     let Some((width, value)) = number_of(kind).filter(|_| ["<", ">", "|", "="].contains(&order))
     else {
         return Err(format!(
-            "its values are `{order}{kind}`, which are neither floats, integers nor flags"
+            "its values are `{order}{kind}`, which are neither floats of 16, 32 or 64 bits, integers nor flags"
         ));
     };
     let product = |bytes: Option<u64>, size: &u64| bytes?.checked_mul(*size);

@@ -52,13 +52,7 @@ impl EnvironmentMap {
             },
             error => malformed(error.to_string()),
         })?;
-        if let Some([rx, ry, gx, gy, bx, by, wx, wy]) = raystone_image::other_primaries(path) {
-            warnings.push(format!(
-                "{}: its colours have the primaries ({rx}, {ry}), ({gx}, {gy}), ({bx}, {by}) and the white ({wx}, {wy}); \
-                 they are taken for those of Rec. 709",
-                path.display()
-            ));
-        }
+        warnings.extend(raystone_image::primaries_note(path));
         if raystone_image::is_cube_map(path) {
             let problem = "it has the six sides of a cube; make it a map by latitude and longitude: exrenvmap -l IN.exr OUT.exr";
             return Err(malformed(problem.to_owned()));

@@ -284,6 +284,29 @@ impl<'a> Geometry<'a> {
         }
     }
 
+    fn read_light(&mut self, index: usize, world: Mat4, place: Place<'_>) {
+        let Some(light) = gltf_lights::read(self.document, index, world) else {
+            let what = "lights that are missing or of an unknown type are left out";
+            self.notes.tell(what, place);
+            return;
+        };
+        // Named here, by the node: the scene numbers the lights that it has.
+        let is_dark = light.power(1.0) == 0.0;
+        let problem = light.problem();
+        match problem.or_else(|| is_dark.then(|| "its power is 0".to_owned())) {
+            Some(problem) => {
+                let what = format!("a light is left out: {problem}");
+                self.notes.tell(what, place);
+            }
+            None => {
+                self.lights.push(light);
+                if gltf_lights::has_range(self.document, index) {
+                    self.notes.unread("`range` of lights", place);
+                }
+            }
+        }
+    }
+
     fn read_node(
         &mut self,
         node: Item<'a>,
@@ -291,18 +314,7 @@ impl<'a> Geometry<'a> {
         world: Mat4,
     ) -> Result<(), SceneError> {
         if let Some(index) = gltf_lights::of_node(node) {
-            match gltf_lights::read(self.document, index, world) {
-                Some(light) => {
-                    self.lights.push(light);
-                    if gltf_lights::has_range(self.document, index) {
-                        self.notes.unread("`range` of lights", place);
-                    }
-                }
-                None => {
-                    let what = "lights that are missing or of an unknown type are left out";
-                    self.notes.tell(what, place);
-                }
-            }
+            self.read_light(index, world, place);
         }
         let Some(named) = node.get("mesh").given() else {
             return Ok(());

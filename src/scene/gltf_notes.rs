@@ -4,7 +4,7 @@ use super::gltf_document::Item;
 use super::gltf_instancing::OF_NODES;
 use super::gltf_meshopt::COMPRESSIONS;
 use super::tally::unread_warning;
-use glam::Mat4;
+use glam::{Mat4, Vec4};
 use std::collections::BTreeMap;
 
 /// Extensions that are read, or that change nothing once the data is.
@@ -44,6 +44,9 @@ const NEAREST: usize = 9728;
 /// `wrapS` and `wrapT` of the standard: repeat, clamp, mirror.
 const WRAPS: [usize; 3] = [10_497, 33_071, 33_648];
 
+/// Deviations of a matrix below this are rounding.
+const ROUNDING: f32 = 1e-4;
+
 /// How often something was met, and the first place of it.
 struct Met {
     count: usize,
@@ -82,6 +85,10 @@ impl Notes {
         }
         if !own.is_finite() {
             let what = "nodes have a transform with numbers missing: what they show is dropped";
+            self.tell(what, place);
+        } else if !own.row(3).abs_diff_eq(Vec4::W, ROUNDING) {
+            let what = "nodes have a matrix whose last row is not 0, 0, 0, 1, which is not read: its numbers go \
+                        column by column";
             self.tell(what, place);
         }
     }

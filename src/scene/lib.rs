@@ -35,6 +35,7 @@ mod gltf_roots;
 mod gltf_texture;
 mod hung_lamps;
 mod ies;
+mod image_alpha;
 mod instances;
 pub mod known_figures;
 mod known_files;

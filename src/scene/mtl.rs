@@ -134,13 +134,24 @@ impl Library {
     }
 }
 
-/// The mask of a material whose `map_d` is this, and whose `d` this factor; glass has none of `d` alone.
-fn mask(map_d: Option<Statement>, factor: f32, is_cut_by_d: bool) -> Option<AlphaMask> {
+/// The mask of a material whose `map_d` is this, and whose `d` this factor; glass has none of `d` alone. `is_color` says that
+/// the image is that of the colour, whose alpha alone can be meant.
+fn mask(
+    map_d: Option<Statement>,
+    factor: f32,
+    is_cut_by_d: bool,
+    is_color: bool,
+) -> Option<AlphaMask> {
     match map_d {
-        // Images cut out leaves and fences: a cutoff of one half, in place of MTL's blending.
+        // Images cut out leaves and fences: a cutoff of one half, in place of MTL's blending, which `d` asks for.
         Some(map) => {
-            let channel = map.channel.unwrap_or(AlphaChannel::AlphaOrLuminance);
-            let mask = AlphaMask::of(map.place, channel, Some(AlphaMask::CUTOFF));
+            let unstated = match is_color {
+                true => AlphaChannel::Alpha,
+                false => AlphaChannel::AlphaOrLuminance,
+            };
+            let channel = map.channel.unwrap_or(unstated);
+            let cutoff = (factor >= 1.0).then_some(AlphaMask::CUTOFF);
+            let mask = AlphaMask::of(map.place, channel, cutoff);
             Some(AlphaMask { factor, ..mask })
         }
         None => is_cut_by_d.then(|| AlphaMask::even(factor)),
@@ -272,8 +283,10 @@ impl Contents {
             found.kind == &PHONG && found.parameters.last() != source.shininess.as_ref();
         unread.see_if(is_clamped, "what is beyond 0 to 100000 in `Ns`", line);
         let factor = source.opacity.unwrap_or(1.0);
+        let image = |map: &Map| plain(&in_order(&map.text, &[folder, &self.model_folder]).file);
+        let is_color = map_d.as_ref().map(image) == map_kd.as_ref().map(image);
         let map_d = map_d.map(|map| self.texture(folder, &map, options, unread));
-        let mask = mask(map_d, factor, !is_glass);
+        let mask = mask(map_d, factor, !is_glass, is_color);
         self.unseen.see_if(mask.is_some() && factor <= 0.0, line);
         let mut texture = |map: Option<Map>, is_used: bool| {
             let map = map.filter(|_| is_used && options.textures)?;

@@ -306,12 +306,13 @@ impl Reader<'_> {
         if matches!(kind, "diffuse" | "mirror" | "dielectric" | "microfacet") {
             self.warn_of_others(node, &[], values);
         }
-        let inside = self
-            .number(node, "intIOR")?
-            .map_or(INSIDE_IOR, |v| v as f32);
-        let outside = self
-            .number(node, "extIOR")?
-            .map_or(OUTSIDE_IOR, |v| v as f32);
+        // Other renderers name glasses there, in materials that have no index here.
+        let index = |name: &str, default: f32| -> Result<f32, SceneError> {
+            let is_read = values.contains(&name);
+            let given = is_read.then(|| self.number(node, name)).transpose()?;
+            Ok(given.flatten().map_or(default, |v| v as f32))
+        };
+        let (inside, outside) = (index("intIOR", INSIDE_IOR)?, index("extIOR", OUTSIDE_IOR)?);
         Ok(match kind {
             "diffuse" => {
                 let albedo = self.color(node, "albedo")?.unwrap_or(Vec3::splat(ALBEDO));

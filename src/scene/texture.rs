@@ -1,6 +1,7 @@
 //! Decodes all textures of a scene in parallel.
 
 use super::disguise::Disguise;
+use super::image_alpha;
 use super::reduce::{Texels, encode, reduced};
 use super::{LoadReport, Material, Texture, TextureUse};
 use image::error::UnsupportedErrorKind;
@@ -86,19 +87,11 @@ pub(super) fn decode_all(
     for (source, result) in sources.iter().zip(decoded) {
         new_index.push(match result {
             None => None,
-            Some(Ok((texture, reduced_from, is_cut))) => {
-                if is_cut {
-                    report.warnings.push(format!(
-                        "texture {}: the file ends before the image does; the rest of it is made up",
-                        source.name
-                    ));
-                }
-                if let Some((width, height)) = reduced_from {
-                    report.warnings.push(format!(
-                        "texture {}: reduced from {width}x{height} to {}x{}",
-                        source.name, texture.width, texture.height
-                    ));
-                }
+            Some(Ok((texture, notes))) => {
+                let named = notes
+                    .iter()
+                    .map(|note| format!("texture {}: {note}", source.name));
+                report.warnings.extend(named);
                 textures.push(texture);
                 Some(textures.len() as u32 - 1)
             }
@@ -238,32 +231,37 @@ fn ends_early(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0xff, 0xd8]) && end < start
 }
 
-/// Eight bits per channel. Floats are linear light, whole numbers are as they are to be used; colours become sRGB, in
-/// which textures of colours are kept, and what is brighter than 1 becomes 1.
-fn eight_bits(image: DynamicImage, kind: Texels) -> RgbaImage {
+/// Eight bits per channel, and how many texels were brighter than 1, which becomes 1. Floats are linear light, whole numbers are
+/// as they are to be used; colours become sRGB, in which textures of colours are kept.
+fn eight_bits(image: DynamicImage, kind: Texels) -> (RgbaImage, usize) {
     let is_float = matches!(
         image,
         DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)
     );
     if !matches!(kind, Texels::Colours | Texels::Opaque) || !is_float {
-        return image.into_rgba8();
+        return (image.into_rgba8(), 0);
     }
     let mut light = image.into_rgba32f();
+    let mut bright = 0;
     for pixel in light.pixels_mut() {
+        bright += usize::from(pixel.0[..3].iter().any(|part| *part > 1.0));
         pixel.apply_without_alpha(|part| encode(part.clamp(0.0, 1.0)));
     }
-    DynamicImage::from(light).into_rgba8()
+    (DynamicImage::from(light).into_rgba8(), bright)
 }
 
-/// The texture, its original size if it was reduced, and whether the file ends within the image.
+/// The texture, and what of it is not as in the file.
 fn decode(
     source: &ImageSource<'_>,
     bytes: &[u8],
     max_size: u32,
     kind: Texels,
-) -> Result<(Texture, Option<Size>, bool), String> {
-    let image = reader(&source.name, bytes)?.decode().map_err(said)?;
-    let image = eight_bits(image, kind);
+) -> Result<(Texture, Vec<String>), String> {
+    let reader = reader(&source.name, bytes)?;
+    let format = reader.format();
+    let image = reader.decode().map_err(said)?;
+    let (mut image, bright) = eight_bits(image, kind);
+    image_alpha::mend(bytes, format, &mut image);
     let size = image.dimensions();
     let texels = image.as_raw().as_chunks::<4>().0;
     let larger = size.0.max(size.1) > max_size;
@@ -273,17 +271,33 @@ fn decode(
     } else {
         size.into()
     };
+    let [width, height] = to;
+    let mut notes = Vec::new();
+    if ends_early(bytes) {
+        let note = "the file ends before the image does; the rest of it is made up";
+        notes.push(note.to_owned());
+    }
+    if bright > 0 {
+        let all = texels.len();
+        notes.push(format!(
+            "{bright} of its {all} texels are brighter than 1, which becomes 1"
+        ));
+    }
+    if larger {
+        let (w, h) = size;
+        notes.push(format!("reduced from {w}x{h} to {width}x{height}"));
+    }
     let texture = Texture {
         name: source.name.clone(),
-        width: to[0],
-        height: to[1],
+        width,
+        height,
         texels: if larger {
             reduced(texels, size.into(), to, kind)
         } else {
             texels.to_vec()
         },
     };
-    Ok((texture, larger.then_some(size), ends_early(bytes)))
+    Ok((texture, notes))
 }
 
 #[cfg(test)]

@@ -70,6 +70,7 @@ pub use known_images::verify_images;
 pub use measurement::{Absent, At, Measurement, Preparation, Prepared, Through};
 pub use merge::{Merged, merge};
 pub use options::{RunOptions, RunSummary};
+pub use reference_file::check_reference;
 pub use registries::Registries;
 pub use render::{Pictures, Rendering, render};
 pub use shard::shards;

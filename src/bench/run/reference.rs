@@ -358,6 +358,9 @@ fn finish_reference(
             let remark = uniform::remark(reference.image(), &world.scene, triangles, world.camera);
             remark.map_or(Ok(()), |remark| session.warn(&done, remark))?;
         }
+        let file = session.reference_file.as_ref();
+        let note = file.and_then(|file| file.note.clone());
+        note.map_or(Ok(()), |note| session.warn(&done, note))?;
         session
             .recorder
             .write(&line.hashed(&hash).with_body(Body::Reference))?;

@@ -2,7 +2,7 @@
 
 use super::error::RunError;
 use raystone_config::Experiment;
-use raystone_image::{Image, read_linear};
+use raystone_image::{Image, primaries_note, read_linear};
 use raystone_stats::metrics::Reference;
 
 /// An image that was read, fit for the experiment.
@@ -13,6 +13,17 @@ pub(super) struct ReferenceFile {
     pub hash: String,
     /// The image; its noise is not known.
     pub reference: Reference,
+    /// A note on its colours, if they are not those of images of the run.
+    pub note: Option<String>,
+}
+
+/// Reads the reference that an experiment names, if it names a file, and leaves it.
+///
+/// # Errors
+/// A file that cannot be read, is of another size than the images of the run, or has pixels that are not
+/// finite.
+pub fn check_reference(experiment: &Experiment) -> Result<(), RunError> {
+    ReferenceFile::load(experiment).map(drop)
 }
 
 impl ReferenceFile {
@@ -47,6 +58,7 @@ impl ReferenceFile {
             name,
             hash,
             reference,
+            note: primaries_note(path),
         }))
     }
 }

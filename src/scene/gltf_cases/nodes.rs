@@ -146,6 +146,11 @@ fn transforms_may_be_rounded_flat_or_broken() {
         .load()
         .whole(2)
         .corner([6.0, 1.0, 0.0]);
+    let transposed = [1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+    with("a matrix row by row", "matrix", json!(transposed))
+        .load()
+        .but(2, &["last row is not 0, 0, 0, 1", "node 0"])
+        .corner([1.0, 1.0, 0.0]);
     let mut broken: Vec<Value> = identity.iter().map(|x| json!(x)).collect();
     broken[12] = Value::Null;
     with("a matrix of NaN", "matrix", json!(broken))
@@ -234,6 +239,28 @@ fn what_hangs_on_nodes_is_drawn_or_named() {
     .set("/extensions", reaching)
     .load()
     .but(2, &["`range` of lights (node 0)"]);
+    // By the node, whatever its number among the lights that are left.
+    let odd = json!({"KHR_lights_punctual": {"lights": [
+        {"type": "ambient"}, {"type": "point", "intensity": -1}, {"type": "point", "intensity": 0},
+        {"type": "spot", "spot": {"innerConeAngle": 20, "outerConeAngle": 45}}, {"type": "point"}
+    ]}});
+    let mut lit = case("lights that cannot shine").set("/extensions", odd);
+    for index in 0..5 {
+        let node = json!({"extensions": {"KHR_lights_punctual": {"light": index}}});
+        lit = lit.set("/nodes/-", node);
+        lit = lit.set("/scenes/0/nodes/-", json!(index + 1));
+    }
+    let lit = lit.load();
+    assert_eq!(lit.scene().lights.len(), 1);
+    lit.but(
+        2,
+        &[
+            "unknown type are left out (node 1)",
+            "a light is left out: its intensity is negative (node 2)",
+            "a light is left out: its power is 0 (node 3)",
+            "a light is left out: its cone is none: 0 ≤ inner ≤ outer ≤ π does not hold (node 4)",
+        ],
+    );
     let light = |index: u32| json!({"KHR_lights_punctual": {"light": index}});
     let lights = json!({"KHR_lights_punctual": {"lights": [{"type": "spot"}, {"type": "area"}]}});
     let lit = on("a light", "extensions", light(0))

@@ -2,6 +2,7 @@
 
 mod disguise;
 mod ies;
+mod masks;
 mod nori;
 mod obj;
 mod ply;

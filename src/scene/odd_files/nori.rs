@@ -78,6 +78,27 @@ const NORI: &[(&str, &str, Outcome)] = &[
         Reads(".", &["`<texture>` `albedo` of `<bsdf>` is not read"]),
     ),
     (
+        "<bsdf type=\"roughconductor\"><string name=\"intIOR\" value=\"bk7\"/><color name=\"albedo\" value=\"1 0 0\"/></bsdf>",
+        "",
+        Reads(
+            "r",
+            &["the material `roughconductor` is not known; drawn as diffuse"],
+        ),
+    ),
+    (
+        "<bsdf type=\"diffuse\"><color name=\"albedo\" value=\"1 0 0\"/><string name=\"extIOR\" value=\"air\"/></bsdf>",
+        "",
+        Reads(
+            "r",
+            &["line 4: `<string>` `extIOR` of `<bsdf>` is not read"],
+        ),
+    ),
+    (
+        "<bsdf type=\"dielectric\"><string name=\"intIOR\" value=\"bk7\"/></bsdf>",
+        "",
+        Fails(&["line 4", "`intIOR` is not a number"]),
+    ),
+    (
         "<bsdf type=\"dielectric\"><float name=\"intIOR\" value=\"-1.5\"/></bsdf>",
         "",
         Fails(&["line 4", "indices of refraction are above 0"]),

@@ -148,6 +148,18 @@ fn linear_light_becomes_srgb_as_other_colours_are() {
     for (name, hex) in LIGHT {
         assert_eq!(colors(name, &bytes(hex)), expected, "{name}");
     }
+    let says = |name: &str, file: &[u8]| with_texture(name, file).report.lines().join("\n");
+    let bright = "1 of its 2 texels are brighter than 1, which becomes 1";
+    let told = says("float.tif", &bytes(LIGHT[0].1));
+    assert!(told.contains(bright), "{told}");
+    let hdr = |exponent: u8| {
+        let header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n";
+        [&header[..], &[128, 128, 128, 128, 128, 64, 32, exponent]].concat()
+    };
+    let told = says("light.hdr", &hdr(132));
+    assert!(told.contains(bright), "{told}");
+    let told = says("light.hdr", &hdr(129));
+    assert!(!told.contains("brighter"), "{told}");
     // Mantissas of 128 are half of what the exponent of 128 says, 1.
     let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x80\x40\xff\x00\x80";
     let [grey, [red, green, blue]] = colors("light.hdr", hdr)[..] else {

@@ -244,7 +244,7 @@ fn the_texture_of_the_opacity_is_a_mask() {
     let (mask, warnings) = mask_of("d 0.75\nmap_d -clamp on leaf.png", &masked_png(0, 255));
     let mask = mask.unwrap();
     assert!(!warnings.contains("map_d"), "{warnings}");
-    assert_eq!((mask.factor, mask.cutoff), (0.75, Some(0.5)));
+    assert_eq!((mask.factor, mask.cutoff), (0.75, None));
     assert_eq!(mask.channel, AlphaChannel::Alpha);
     assert_eq!(mask.texture.unwrap().wrap, [Wrap::Clamp; 2]);
 

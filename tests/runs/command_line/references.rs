@@ -150,8 +150,11 @@ fn a_reference_that_does_not_fit_ends_with_2_before_anything_is_measured() {
     ] {
         let (code, said, lines) = run(folder.path(), "c", &["--reference", file]);
         assert!(code == 2 && lines.is_empty(), "{said}");
+        let (planned, seen, _) = run(folder.path(), "d", &["--reference", file, "--dry-run"]);
+        assert_eq!(planned, 2, "{seen}");
         for piece in pieces {
             assert!(said.contains(piece), "no {piece} in {said}");
+            assert!(seen.contains(piece), "no {piece} in {seen}");
         }
     }
     let file = folder.path().join("trial.toml");
@@ -160,6 +163,31 @@ fn a_reference_that_does_not_fit_ends_with_2_before_anything_is_measured() {
     let two = ["run", text(&file), "--reference", text(&wrong), "--set"];
     let two = output(program(&two).arg("axes.scene=cornell-box,furnace-box"));
     assert!(error(&two, 2).contains("reference.file"));
+}
+
+#[test]
+fn a_reference_of_other_primaries_is_named_in_the_run_and_its_records() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let texels = [128, 64, 32, 129].repeat(24 * 16);
+    for (name, line, is_other) in [
+        ("plain", "", false),
+        (
+            "aces",
+            "PRIMARIES=0.7347 0.2653 0 1 0.0001 -0.077 0.3217 0.3377\n",
+            true,
+        ),
+    ] {
+        let head = format!("#?RADIANCE\n{line}FORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 24\n");
+        let file = folder.path().join(format!("{name}.hdr"));
+        std::fs::write(&file, [head.as_bytes(), &texels].concat()).expect("an image");
+        let (_, said, lines) = run(folder.path(), name, &["--reference", text(&file)]);
+        let note = "they are taken for those of Rec. 709";
+        let recorded = lines.iter().any(|line| match &line.body {
+            Body::Warning(told) => format!("{told:?}").contains(note),
+            _ => false,
+        });
+        assert_eq!([said.contains(note), recorded], [is_other; 2], "{said}");
+    }
 }
 
 /// Returns `true` if the reference of a run with this cache was there, and the errors against it.
