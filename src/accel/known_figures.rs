@@ -38,6 +38,7 @@ pub fn check() -> Result<(), String> {
     shapes()?;
     overlaps_of_copies()?;
     overlap_of_a_part()?;
+    crate::tree::check_spread()?;
     known_rows::check()?;
     known_cells::check()?;
     known_trees::check()?;

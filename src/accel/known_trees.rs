@@ -162,6 +162,7 @@ pub(crate) fn check() -> Result<(), String> {
         }
     }
     depths()?;
+    spatial_budget()?;
     expansions()?;
     check_room()?;
     check_order()
@@ -227,40 +228,87 @@ fn depths() -> Result<(), String> {
     })
 }
 
-/// Half of 16 in the first unit of a box of 16 × 2 × 2, the others in the last; a ray beside them.
+/// Spatial splits of 32 long slivers side by side, all of which pay, make as many references as there are triangles beside those, and no more.
+fn spatial_budget() -> Result<(), String> {
+    const SLIVERS: u16 = 32;
+    let sliver = |k: u16| {
+        let low = Vec3::X * f32::from(k);
+        let high = low + vec3(32.0, 32.0, 0.0);
+        Triangle {
+            vertices: [low, high, high + 0.25 * Vec3::Z],
+        }
+    };
+    let slivers: Vec<Triangle> = (0..SLIVERS).map(sliver).collect();
+    let leaves_of_one = params([
+        ("builder", ParamValue::Name("sbvh".to_owned())),
+        ("spatial_alpha", ParamValue::Number(0.0)),
+        ("leaf_size", ParamValue::Integer(1)),
+        ("min_leaf_size", ParamValue::Integer(1)),
+    ]);
+    let found = stats_with("bvh", &leaves_of_one, &slivers)?.references;
+    let expected = 2 * u64::from(SLIVERS);
+    (found == expected).then_some(()).ok_or_else(|| {
+        let found = format!("{found} references");
+        wrong(
+            "tree of spatial splits over known slivers",
+            &found,
+            &expected.to_string(),
+        )
+    })
+}
+
+/// Half of 16 in the first unit of a box of 16 × 2 × 2, the others in the last; a ray beside them. The same along all axes.
 fn expansions() -> Result<(), String> {
     let at_end = |k: u16| {
         let low = Vec3::X * (15.0 * f32::from(k % 2));
-        Triangle {
-            vertices: [low, low + vec3(1.0, 0.0, 2.0), low + 2.0 * Vec3::Y],
-        }
+        [low, low + vec3(1.0, 0.0, 2.0), low + 2.0 * Vec3::Y]
     };
-    let records = (0..16).map(|k| TriangleRecord::new(&at_end(k), k.into(), 0));
-    let soup = TriangleSoup::from(records.collect::<Vec<_>>());
-    let registry = AccelRegistry::default();
-    let kind = registry.named("structure", "irregular-grid")?;
-    let ray = Ray::new([-1.0, 1.75, 1.75], [1.0, 0.0, 0.0]);
-    for (expansions, expected) in (0..).zip(PASSED) {
-        let params = params([
-            ("lambda1", ParamValue::Number(0.5)),
-            ("lambda2", ParamValue::Number(0.001)),
-            ("alpha", ParamValue::Number(0.0)),
-            ("expansions", ParamValue::Integer(expansions)),
-        ]);
-        let built = kind.build(&soup, &params, &mut BuildLog::default());
-        let built = built.map_err(|e| e.to_string())?;
-        let twin = built
-            .cpu_twin(&soup)
-            .ok_or("an irregular-grid has no twin")?;
-        let mut counted = Counters::default();
-        twin.closest_hit(&ray, &mut counted);
-        if counted.nodes != expected {
-            let what = format!("way through a known irregular-grid after {expansions} expansions");
-            let found = format!("{} cells", counted.nodes);
-            return Err(wrong(&what, &found, &expected.to_string()));
+    for turn in 0..3 {
+        let turned = |mut at: [f32; 3]| {
+            at.rotate_right(turn);
+            at
+        };
+        let records = (0..16).map(|k| {
+            let vertices = at_end(k).map(|v| turned(v.to_array()).into());
+            TriangleRecord::new(&Triangle { vertices }, k.into(), 0)
+        });
+        let soup = TriangleSoup::from(records.collect::<Vec<_>>());
+        let ray = Ray::new(turned([-1.0, 1.75, 1.75]), turned([1.0, 0.0, 0.0]));
+        for (expansions, expected) in (0..).zip(PASSED) {
+            let found = cells_passed(&soup, &ray, expansions)?;
+            if found != expected {
+                let what = format!(
+                    "way along axis {turn} through a known irregular-grid after {expansions} expansions"
+                );
+                return Err(wrong(
+                    &what,
+                    &format!("{found} cells"),
+                    &expected.to_string(),
+                ));
+            }
         }
     }
     Ok(())
+}
+
+/// How many cells of an irregular grid that was expanded so often a ray passes.
+fn cells_passed(soup: &TriangleSoup, ray: &Ray, expansions: i64) -> Result<u32, String> {
+    let params = params([
+        ("lambda1", ParamValue::Number(0.5)),
+        ("lambda2", ParamValue::Number(0.001)),
+        ("alpha", ParamValue::Number(0.0)),
+        ("expansions", ParamValue::Integer(expansions)),
+    ]);
+    let registry = AccelRegistry::default();
+    let kind = registry.named("structure", "irregular-grid")?;
+    let built = kind.build(soup, &params, &mut BuildLog::default());
+    let built = built.map_err(|e| e.to_string())?;
+    let twin = built
+        .cpu_twin(soup)
+        .ok_or("an irregular-grid has no twin")?;
+    let mut counted = Counters::default();
+    twin.closest_hit(ray, &mut counted);
+    Ok(counted.nodes)
 }
 
 fn wrong(what: &str, found: &str, expected: &str) -> String {

@@ -20,12 +20,13 @@ pub(crate) struct Contender {
     pub log: Option<LogFigure>,
 }
 
-/// Judges two known cases.
+/// Judges two known cases, and the drift of known controls.
 ///
 /// # Errors
 /// The winner is another one: of which, and what to do.
 pub fn check() -> Result<(), String> {
     use Better::{Higher, Lower};
+    crate::compare::drift::check()?;
     // Three and five, known to a twentieth.
     let contender = |value: f64| {
         let figure = Interval {

@@ -12,6 +12,7 @@ use raystone_core::params::ParamValue;
 
 mod defaults;
 mod further;
+mod rare;
 
 /// In a folder that no machine has.
 static FILES: &[(&str, &[u8])] = &[
@@ -35,6 +36,11 @@ static FILES: &[(&str, &[u8])] = &[
     ("known:/c.ply", include_bytes!("known_files/c.ply")),
     ("known:/c.hdr", include_bytes!("known_files/c.hdr")),
     ("known:/c.pfm", include_bytes!("known_files/c.pfm")),
+    ("known:/d.gltf", include_bytes!("known_files/d.gltf")),
+    ("known:/d.obj", include_bytes!("known_files/d.obj")),
+    ("known:/d.mtl", include_bytes!("known_files/d.mtl")),
+    ("known:/d.ply", include_bytes!("known_files/d.ply")),
+    ("known:/d.hdr", include_bytes!("known_files/d.hdr")),
 ];
 
 /// What they say.
@@ -52,6 +58,7 @@ pub(crate) fn values() -> Result<Vec<Known>, String> {
     all.media()?;
     defaults::values(&mut all)?;
     further::values(&mut all)?;
+    rare::values(&mut all)?;
     Ok(all.0)
 }
 

@@ -55,6 +55,7 @@ pub fn check() -> Result<(), String> {
         (OF_FUNCTIONS, known_tests::ratio()),
         (ROUNDING, known_tests::front()),
         (OF_FUNCTIONS, known_tests::laws()),
+        (OF_FUNCTIONS, known_tests::many()),
         (OF_PIXELS, known_tests::biases()?),
         (OF_POWER, known_tests::verdicts()?),
         (ROUNDING, known_metrics::metrics()?),

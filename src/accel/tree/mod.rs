@@ -22,6 +22,7 @@ pub use coverage::Coverage;
 pub(super) use leaves::distinct;
 pub use parameters::{Builder, TreeParameters};
 pub(crate) use ploc::LARGEST_COORDINATE as LARGEST_OF_PLOC;
+pub(crate) use quality::check_spread;
 
 use super::bounds::Bounds;
 use super::{AccelError, BuildLog, TriangleSoup, auto};

@@ -6,6 +6,7 @@ use crate::TriangleSoup;
 use crate::polygon::Polygon;
 use crate::triangle::TriangleRecord;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 
 /// Triangles per task; constant, so that the sum does not depend on the number of threads.
 const TRIANGLES_PER_TASK: usize = 16;
@@ -141,6 +142,24 @@ fn spread(count: usize) -> Vec<usize> {
     let golden = (count as f64 * 0.618_033_988_749_895) as usize;
     let step = (golden..).find(|&step| gcd(step, count) == 1).unwrap_or(1);
     (0..count).map(|k| k * step % count).collect()
+}
+
+/// Checks that every triangle comes once, whatever divides their number.
+///
+/// # Errors
+/// One does not: of how many.
+pub(crate) fn check_spread() -> Result<(), String> {
+    for count in 1..=64 {
+        let seen: BTreeSet<usize> = spread(count).into_iter().collect();
+        if seen.len() != count {
+            let found = seen.len();
+            return Err(format!(
+                "the overlap of {count} known triangles is that of {found}: this program computes wrong figures; build it anew, and \
+                 report what stays wrong"
+            ));
+        }
+    }
+    Ok(())
 }
 
 fn gcd(a: usize, b: usize) -> usize {

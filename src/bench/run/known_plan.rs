@@ -4,7 +4,7 @@
 use super::registries::Registries;
 use super::{adaptive, known_scenes, known_settings, known_turns};
 use crate::{animation, coherence, ray_sets};
-use raystone_config::{Axis, Cell, Experiment, Plan};
+use raystone_config::{Axis, Cell, Experiment, Plan, split_outside_brackets};
 
 /// Two excludes leave a decorrelation to each sequence, one a structure to a scene, one a sequence to a structure.
 const TEXT: &str = r#"
@@ -40,6 +40,8 @@ const TEXT: &str = r#"
     rays = 2048
 "#;
 const OVERRIDE: &str = "run.replicates=4";
+/// Two names, of which each has a list and another parameter.
+const NAMES: &str = "bvh(a=[1, 2], b=3),kd-tree(c=4, d=[(5, 6), 7])";
 
 /// By hand; the first seed of the reference is that of PCG's output function (Jarzynski and Olano 2020) of 5. Of 2 · 3 · 2 · 2 = 24 cells the excludes name 2 · 3, 2 · 3, 4 and 2 · 2 · 2.
 const EXPECTED: &str = "\
@@ -68,6 +70,13 @@ pub fn check() -> Result<(), String> {
     ray_sets::readings::check_known()?;
     raystone_gpu::check_sizes()?;
     raystone_gpu::check_span()?;
+    let names = split_outside_brackets(NAMES, ',').count();
+    if names != 2 {
+        return Err(format!(
+            "`{NAMES}` is {names} names, and should be two: this program chooses other cells than it is asked for; build it anew, and \
+             report what stays wrong"
+        ));
+    }
     let found = planned(TEXT)?;
     let mut pairs = found.lines().zip(EXPECTED.lines());
     match pairs.find(|(found, expected)| found != expected) {

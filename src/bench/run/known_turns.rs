@@ -110,8 +110,8 @@ fn interleaved(max_warmup_ms: u32, seed: u64) -> Result<Turned, String> {
     Ok((log.take(), found))
 }
 
-/// Three measurements in rounds, in an order by the seed: each has one turn in each, none of which warms up, and they do not always take the same
-/// places.
+/// Three measurements in rounds, in an order by the seed: each has one turn in each, none of which warms up, and they take
+/// all places, also in orders that no turn of all three makes.
 fn rounds((max_warmup_ms, warm_up): (u32, usize)) -> Result<(), String> {
     let wrong = |what: &str| {
         Err(format!(
@@ -137,6 +137,12 @@ fn rounds((max_warmup_ms, warm_up): (u32, usize)) -> Result<(), String> {
         return wrong(
             "a measurement never has the first turn of a round, or the second or the last",
         );
+    }
+    if !ordered
+        .iter()
+        .any(|round| (0..3).filter(|&k| round[k] == k).count() == 1)
+    {
+        return wrong("two measurements never change places while the third keeps its own");
     }
     for (place, found) in found.into_iter().enumerate() {
         let samples = found.map_err(|e| e.to_string())?;

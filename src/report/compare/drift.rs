@@ -117,6 +117,35 @@ impl Drift {
     }
 }
 
+/// Computes the spread of three known controls: their mean square is (0.1² + 0.1² + 0.2²) / 3 = 0.02, their rounds' 0.001, and what rounds have
+/// beyond that is added.
+///
+/// # Errors
+/// It is another: both values.
+pub(crate) fn check() -> Result<(), String> {
+    let place = Place {
+        figure: String::new(),
+        scene: String::new(),
+        clock: "",
+    };
+    let mut drift = Drift::default();
+    for log in [0.1, -0.1, 0.2] {
+        drift.add(place.clone(), log, 0.001);
+    }
+    for (rounds, expected) in [(0.005, 0.024), (0.0005, 0.02)] {
+        let found = drift.of(&place, rounds, None);
+        let is_right =
+            |s: Spread| (s.variance - expected).abs() < 1e-12 && (s.freedom - 3.0).abs() < 1e-12;
+        if !found.is_some_and(is_right) {
+            return Err(format!(
+                "the drift of known controls is {found:?}, and should be {expected} with three degrees of freedom: this program compares \
+                 times wrongly; build it anew, and report what stays wrong"
+            ));
+        }
+    }
+    Ok(())
+}
+
 /// Returns the mean square of the logarithms plus the excess noise of these rounds over those of controls.
 fn spread(controls: &[&Control], own_rounds: f64, most_freedom: f64) -> Option<Spread> {
     let count = controls.len() as f64;

@@ -22,6 +22,7 @@ pub fn check() -> Result<(), String> {
         ("table of counts", counts()),
         ("scale of heat maps", scale()),
         ("pair of axes", axes()),
+        ("row of marks", marks()),
         ("raster", raster()),
         ("spectrum", spectrum()),
     ];
@@ -155,6 +156,19 @@ fn axes() -> bool {
         && is_corner(up, [origin.0, 14.0])
         && is_corner(origin, [origin.0, 248.0])
         && (60.0..120.0).contains(&origin.0)
+}
+
+/// Within an octave marks have the digits that tell them apart, below one as above.
+fn marks() -> bool {
+    let all = |range: [f64; 2], texts: &[&str]| {
+        let Some(axis) = Axis::log10(range.into_iter(), "x") else {
+            return false;
+        };
+        let mut drawing = Drawing::new(600.0, 300.0);
+        Axes::new(axis, Axis::linear(4.0, "y"), 600.0, 300.0).draw(&mut drawing);
+        texts.iter().all(|text| places(&drawing, text).len() == 1)
+    };
+    all([1.1, 2.6], &["1.2", "1.5", "2.5"]) && all([0.011, 0.026], &["0.012", "0.015", "0.025"])
 }
 
 /// Of three columns and two rows, each twice as large, and wider than high in SVG, too.
