@@ -9,6 +9,7 @@ use raystone::measure::record::read_records;
 use raystone::report::write_page;
 use raystone::run::records_in;
 use serde_json::json;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -30,7 +31,15 @@ pub struct HistoryOf {
 impl HistoryOf {
     pub fn execute(self) -> Result<ExitCode> {
         let mut all = Vec::new();
+        let mut seen = BTreeSet::new();
         for dir in self.dirs.iter().map(|dir| records_in(dir)) {
+            if !seen.insert(dir.canonicalize().unwrap_or_else(|_| dir.clone())) {
+                warn(&format!(
+                    "{}: given before, and counted once",
+                    dir.display()
+                ));
+                continue;
+            }
             let records = read_records(&dir)?;
             for warning in &records.warnings {
                 warn(&format!("{}: {warning}", dir.display()));

@@ -53,7 +53,9 @@ pub enum ReportError {
     #[error(transparent)]
     Records(#[from] RecordError),
     /// A file of the report cannot be written.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error(
+        "cannot write {}: {source}; make space, or the folder writable: records are kept, and `raystone report` makes their page", path.display()
+    )]
     Write {
         /// The file.
         path: PathBuf,

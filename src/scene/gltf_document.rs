@@ -142,8 +142,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(Value, Option<String>), String> {
     if !text.trim_start().starts_with('{') {
         let start: String = text.chars().take(8).collect();
         return Err(format!(
-            "neither binary glTF, which begins with `glTF`, nor JSON text, which begins with `{{`: it begins with {start:?}; \
-             export or download the model again"
+            "neither binary glTF, which begins with `glTF`, nor JSON text, which begins with `{{`, but {start:?}, at line 1 column 1"
         ));
     }
     match serde_json::from_str(&mended(text)) {

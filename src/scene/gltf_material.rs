@@ -17,6 +17,7 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 const FROSTED: f32 = 0.1;
 
 const SPECULAR: &str = "KHR_materials_specular";
+const UNLIT: &str = "KHR_materials_unlit";
 
 /// Surface extensions that are not rendered, or in part.
 const EXTENSIONS: [&str; 9] = [
@@ -28,7 +29,7 @@ const EXTENSIONS: [&str; 9] = [
     "KHR_materials_sheen",
     SPECULAR,
     "KHR_materials_subsurface",
-    "KHR_materials_unlit",
+    UNLIT,
 ];
 
 /// All materials of a document and the images they need.
@@ -223,6 +224,8 @@ fn convert(
     let model = material.get(METALLIC);
     let gloss = gloss(material);
     let transmission = material.extension(TRANSMISSION).given();
+    // Its plain colour is nearest to a diffuse surface, which has none of these numbers.
+    let is_lit = !material.extension(UNLIT).is_given();
     let strength = material.extension("KHR_materials_emissive_strength");
     let strength = strength.number("emissiveStrength").unwrap_or(1.0);
     let emission = emitted(material.vector("emissiveFactor", [0.0; 3])) * strength;
@@ -234,17 +237,16 @@ fn convert(
     let factor = |part: Item<'_>, key: &str, default: f32| part.number(key).unwrap_or(default);
     let volume = material.extension(VOLUME).given();
     let source = MaterialSource {
-        roughness: Some(match gloss {
+        roughness: is_lit.then(|| match gloss {
             Some(gloss) => 1.0 - factor(gloss, "glossinessFactor", 1.0),
             None => factor(model, "roughnessFactor", 1.0),
         }),
-        metallic: gloss
-            .is_none()
-            .then(|| factor(model, "metallicFactor", 1.0)),
-        specular: gloss.map(|gloss| gloss.vector("specularFactor", [1.0; 3])),
+        metallic: (is_lit && gloss.is_none()).then(|| factor(model, "metallicFactor", 1.0)),
+        specular: (gloss.filter(|_| is_lit)).map(|gloss| gloss.vector("specularFactor", [1.0; 3])),
         shininess: None,
         ior: ior(material),
-        transmission: transmission.map(|t| factor(t, "transmissionFactor", 0.0)),
+        transmission: (transmission.filter(|_| is_lit))
+            .map(|t| factor(t, "transmissionFactor", 0.0)),
         filter: None,
         thickness: volume.map(|v| factor(v, "thicknessFactor", 0.0)),
         opacity: Some(color.w),
@@ -296,6 +298,14 @@ fn warnings(document: Item<'_>, materials: &[Material]) -> Vec<String> {
     };
     let transmissive =
         of(&|m, _| m.kind != &DIELECTRIC && m.source.transmission.is_some_and(|t| t > 0.0));
+    let partly = of(&|m, _| {
+        m.kind == &DIELECTRIC && m.source.transmission.is_some_and(|t| t > 0.0 && t < 1.0)
+    });
+    let beyond = of(&|m, _| {
+        let source = &m.source;
+        let factors = [source.metallic, source.roughness, source.transmission];
+        (factors.iter().flatten()).any(|factor| !(0.0..=1.0).contains(factor))
+    });
     let frosted =
         of(&|m, _| m.kind == &DIELECTRIC && m.source.roughness.is_some_and(|r| r > FROSTED));
     // A texture may scale the metalness, so the factor alone decides nothing.
@@ -321,12 +331,19 @@ fn warnings(document: Item<'_>, materials: &[Material]) -> Vec<String> {
             SPECULAR => {
                 "if it scaled the reflectance at normal incidence alone, by the mean of its colour"
             }
+            UNLIT => "diffuse",
             _ => "if it were not",
         };
         approximation_warning(&format!("extended by {name}"), as_if, names)
     });
     [
         approximation_warning("transmissive", "if it were not", transmissive),
+        approximation_warning("partly transmissive", "wholly transmissive", partly),
+        approximation_warning(
+            "of a metalness, roughness or transmission beyond 0 to 1",
+            "if it were the nearest of these",
+            beyond,
+        ),
         approximation_warning("frosted glass", "clear glass", frosted),
         approximation_warning("rough metal", "diffuse", metal),
         approximation_warning("of an unknown alpha mode", "opaque", unknown),

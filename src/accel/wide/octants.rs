@@ -10,13 +10,14 @@ use crate::bounds::Bounds;
 /// One per octant.
 const SLOTS: usize = 8;
 
-/// Projection of a child's offset on the direction of a slot.
-fn agreement(offset: [f32; 3], slot: usize) -> f32 {
+/// Projection of a child's offset on the direction of a slot, as an integer in the order of [`f32::total_cmp`].
+fn agreement(offset: [f32; 3], slot: usize) -> i32 {
     let along = |axis: usize| {
         let x = offset[axis];
         if slot >> axis & 1 == 1 { x } else { -x }
     };
-    along(0) + along(1) + along(2)
+    let bits = (along(0) + along(1) + along(2)).to_bits().cast_signed();
+    bits ^ (bits >> 31 & i32::MAX)
 }
 
 /// Eight children in the corners of a cube take the slots whose bits say on which side they lie.
@@ -59,7 +60,7 @@ pub(super) fn arrange(bounds: &Bounds, children: &[WideChild]) -> Vec<WideChild>
     for (row, child) in agreements.iter_mut().zip(children) {
         let centre = child.bounds.doubled_centre();
         let offset = [0, 1, 2].map(|axis| centre[axis] - middle[axis]);
-        *row = std::array::from_fn(|slot| ordered(agreement(offset, slot)));
+        *row = std::array::from_fn(|slot| agreement(offset, slot));
     }
     let mut free = [true; SLOTS];
     let best_of = |index: usize, free: &[bool; SLOTS]| {
@@ -90,10 +91,4 @@ pub(super) fn arrange(bounds: &Bounds, children: &[WideChild]) -> Vec<WideChild>
         }
     }
     slots
-}
-
-/// The bits of a number as an integer in the order of [`f32::total_cmp`].
-fn ordered(number: f32) -> i32 {
-    let bits = number.to_bits().cast_signed();
-    bits ^ (bits >> 31 & i32::MAX)
 }

@@ -250,7 +250,8 @@ impl<'a> Work<'a> {
             if spread.is_none() && !in_rounds && again.is_none() {
                 finding.why =
                     "two runs without enough unchanged cells to tell the machine's drift by".into();
-                finding.why += &format!("; it moved by {:+.1} %", 100.0 * measured.change.value);
+                let moved = format!("{:+.1}", 100.0 * measured.change.value);
+                finding.why += &format!("; it moved by {} %", moved.replace('-', "−"));
                 continue;
             }
             finding.why = format!("{}, {}", ratio.clock, measured.how);

@@ -326,6 +326,30 @@ fn surfaces_that_are_drawn_otherwise_are_named() {
                 "pane",
             ],
         );
+    case("most of glass")
+        .material(json!({"name": "pane", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
+            "extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.75}}}))
+        .load()
+        .but(2, &["1 material is partly transmissive", "pane"]);
+    for factors in [
+        json!({"metallicFactor": 2}),
+        json!({"roughnessFactor": -1}),
+        json!({"metallicFactor": -0.5, "roughnessFactor": 0.5}),
+    ] {
+        case("factors beyond their range")
+            .material(json!({"name": "odd", "pbrMetallicRoughness": factors}))
+            .load()
+            .but(2, &["beyond 0 to 1", "odd"]);
+    }
+    let unlit = case("unlit")
+        .material(
+            json!({"name": "sign", "extensions": {"KHR_materials_unlit": {}},
+            "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 1, 1]}}),
+        )
+        .load()
+        .but(2, &["KHR_materials_unlit", "sign"])
+        .color([0.5, 0.25, 1.0]);
+    assert_eq!(unlit.scene().materials[0].kind, &crate::DIFFUSE);
     case("blended")
         .material(json!({"name": "veil", "alphaMode": "BLEND"}))
         .load()

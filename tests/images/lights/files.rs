@@ -182,7 +182,7 @@ fn lights_of_gltf_models_are_where_their_nodes_are() {
     assert_eq!(scene.lights[2], spot);
     assert!(scene.daylight.is_none());
     assert!(
-        scene.report.warnings[0].contains("light 3 (point)"),
+        scene.report.warnings[0].contains("left out: its power is 0 (node 4)"),
         "{:?}",
         scene.report
     );

@@ -411,6 +411,17 @@ fn a_history_finds_the_run_in_which_a_count_changed() {
     assert!(out.join("index.html").exists() && out.join("plots/nodes-v1-0.svg").exists());
     let table = done(&[&["history"][..], &order, &["--figure", "nodes"]].concat());
     assert!(table.contains("c2"), "{table}");
+    // A folder counts once.
+    let twice = [
+        &["history"][..],
+        &order,
+        &order[..1],
+        &["--figure", "nodes"],
+    ]
+    .concat();
+    let output = program(&twice);
+    assert_eq!(String::from_utf8_lossy(&output.stdout), table);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("given before"));
 }
 
 #[test]
