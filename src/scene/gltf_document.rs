@@ -139,7 +139,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(Value, Option<String>), String> {
         Ok(value) => return Ok((value, None)),
         Err(error) => error.to_string(),
     };
-    if !text.trim_start().starts_with('{') {
+    if !text.trim_start().starts_with(['{', '[']) {
         let start: String = text.chars().take(8).collect();
         return Err(format!(
             "neither binary glTF, which begins with `glTF`, nor JSON text, which begins with `{{`, but {start:?}, at line 1 column 1"
