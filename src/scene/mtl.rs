@@ -145,9 +145,10 @@ fn mask(
     match map_d {
         // Images cut out leaves and fences: a cutoff of one half, in place of MTL's blending, which `d` asks for.
         Some(map) => {
-            let unstated = match is_color {
-                true => AlphaChannel::Alpha,
-                false => AlphaChannel::AlphaOrLuminance,
+            let unstated = if is_color {
+                AlphaChannel::Alpha
+            } else {
+                AlphaChannel::AlphaOrLuminance
             };
             let channel = map.channel.unwrap_or(unstated);
             let cutoff = (factor >= 1.0).then_some(AlphaMask::CUTOFF);

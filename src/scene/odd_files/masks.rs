@@ -1,6 +1,6 @@
 //! Images of the opacity in MTL.
 
-use super::{SceneData, load_files};
+use super::{SceneData, bc1, load_files};
 use crate::AlphaChannel;
 
 /// A model whose material has these statements; `leaf.png` and `leaf.tga` are this image.
@@ -69,37 +69,12 @@ fn dark_parts_of_an_image_of_the_colour_are_no_holes() {
     }
 }
 
-/// A DDS file of one block of BC1: these two colours, the fourth choice in the first row of texels, and the first elsewhere.
-fn block(colors: [u16; 2], has_late_header: bool) -> Vec<u8> {
-    let mut dds = [&b"DDS "[..], &[0; 124]].concat();
-    let words = [
-        (4, 124),
-        (8, 0x1007),
-        (12, 4),
-        (16, 4),
-        (76, 32),
-        (80, 4),
-        (108, 0x1000),
-    ];
-    for (at, word) in words {
-        dds[at..at + 4].copy_from_slice(&u32::to_le_bytes(word));
-    }
-    dds[84..88].copy_from_slice(if has_late_header { b"DX10" } else { b"DXT1" });
-    if has_late_header {
-        let format_and_plane = [71_u32, 3, 0, 1, 0];
-        dds.extend(format_and_plane.into_iter().flat_map(u32::to_le_bytes));
-    }
-    dds.extend(colors.into_iter().flat_map(u16::to_le_bytes));
-    dds.extend([0xff, 0, 0, 0]);
-    dds
-}
-
 #[test]
 fn the_fourth_choice_of_bc1_is_a_hole_where_the_first_colour_is_not_above_the_second() {
     let [blue, red] = [0x001f, 0xf800];
     for has_late_header in [false, true] {
         for (colors, alpha) in [([blue, red], 0), ([red, red], 0), ([red, blue], 255)] {
-            let dds = block(colors, has_late_header);
+            let dds = bc1(colors, [0xff, 0, 0, 0], has_late_header);
             let scene = masked("map_Kd leaf.png\nmap_d leaf.png", &dds);
             let [texture] = &scene.textures[..] else {
                 panic!("{:?}", scene.report);

@@ -76,6 +76,31 @@ fn check_parts(case: &str, text: &str, parts: &[&str]) {
     }
 }
 
+/// A DDS file of one block of BC1: two colours, and the choices of each row's texels, two bits each.
+fn bc1(colors: [u16; 2], choices: [u8; 4], has_late_header: bool) -> Vec<u8> {
+    let mut dds = [&b"DDS "[..], &[0; 124]].concat();
+    let words = [
+        (4, 124),
+        (8, 0x1007),
+        (12, 4),
+        (16, 4),
+        (76, 32),
+        (80, 4),
+        (108, 0x1000),
+    ];
+    for (at, word) in words {
+        dds[at..at + 4].copy_from_slice(&u32::to_le_bytes(word));
+    }
+    dds[84..88].copy_from_slice(if has_late_header { b"DX10" } else { b"DXT1" });
+    if has_late_header {
+        let format_and_plane = [71_u32, 3, 0, 1, 0];
+        dds.extend(format_and_plane.into_iter().flat_map(u32::to_le_bytes));
+    }
+    dds.extend(colors.into_iter().flat_map(u16::to_le_bytes));
+    dds.extend(choices);
+    dds
+}
+
 /// Writes files into a folder of their own and loads the first.
 fn load_files(files: &[(&str, &[u8])]) -> Result<SceneData, String> {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,6 +1,6 @@
 //! Textures in the formats that models of others have. The bytes are Pillow's 12 and tifffile's, or written by hand.
 
-use super::{SceneData, load_files};
+use super::{SceneData, bc1, load_files};
 use crate::texture::{Encoded, ImageSource, decode_all};
 use crate::{LoadReport, Material, TextureUse};
 
@@ -120,21 +120,7 @@ fn textures_of_old_formats_are_the_right_way_up_and_of_the_right_colours() {
         assert_eq!(colors(name, &bytes(hex)), expected, "{name}");
     }
     // DXT1: the first of two colours in the first row of texels, then the second.
-    let mut dds = [&b"DDS "[..], &[0; 124]].concat();
-    let words = [
-        (4, 124),
-        (8, 0x1007),
-        (12, 4),
-        (16, 4),
-        (76, 32),
-        (80, 4),
-        (108, 0x1000),
-    ];
-    for (at, word) in words {
-        dds[at..at + 4].copy_from_slice(&u32::to_le_bytes(word));
-    }
-    dds[84..88].copy_from_slice(b"DXT1");
-    dds.extend([0x00, 0xf8, 0x1f, 0x00, 0x00, 0x55, 0x55, 0x55]);
+    let dds = bc1([0xf800, 0x001f], [0, 0x55, 0x55, 0x55], false);
     let [first, second] = [[[255, 0, 0]; 4], [[0, 0, 255]; 4]];
     assert_eq!(
         colors("block.dds", &dds),
