@@ -127,7 +127,8 @@ fn tables(data: &RunData) -> Vec<Table> {
         tables.push(structures::speed_table(names, scene, &values));
         tables.push(structures::outside_table(data, scene, &values));
         let of_frames = animation::values(data, scene);
-        tables.push(TREES.table(names, &of_frames, &[]));
+        let bounds = animation::bounds(data, scene);
+        tables.push(TREES.table(names, &of_frames, &[&bounds]));
         let mut of_views = Vec::new();
         for view in &scene.views {
             let values = of_view(data, scene, view);

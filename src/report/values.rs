@@ -82,6 +82,15 @@ impl From<f64> for Estimate {
     }
 }
 
+/// Describes the bounds of the medians among these values.
+pub(crate) fn median_bounds(values: &[Value]) -> String {
+    let rounds = |value: &Value| match &value.source.samples {
+        Samples::Rounds { adapter, .. } => adapter.len(),
+        _ => 0,
+    };
+    format::median_bounds(values.iter().map(rounds))
+}
+
 impl Value<'static> {
     /// Creates a figure of this crate.
     pub fn new(key: &Key, figure: &'static Figure, estimate: impl Into<Estimate>) -> Self {
@@ -491,6 +500,10 @@ mod tests {
                 "mrays-per-s/v1,speed,Mrays/s,2,1,3,\"median, {range}\""
             ))
         );
+        // A caption speaks for the medians of fewest rounds.
+        let timed = [5, 9].map(|rounds| of(rounds, &figure::NS_PER_SAMPLE));
+        assert_eq!(median_bounds(&timed), range);
+        assert_eq!(median_bounds(&timed[1..]), "95 % interval");
         let enough = of(6, &figure::MRAYS_PER_S);
         assert_eq!(enough.spread_words(), Spread::Median.words());
         assert_eq!(

@@ -70,7 +70,7 @@ fn describe(
         }
         let kinds = counts
             .iter()
-            .map(|(plural, count)| format!("{count} {plural}"));
+            .map(|(plural, count)| format!("{plural}: {count}"));
         let kinds = kinds.collect::<Vec<_>>().join(", ");
         let sum: f64 = own.iter().map(|place| seconds[*place]).sum();
         writeln!(text, "  {number}/{of}  about {:>7}  {kinds}", duration(sum))?;

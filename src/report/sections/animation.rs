@@ -18,7 +18,8 @@ pub fn blocks(data: &RunData, stem: &str, scene: &SceneGroup) -> Vec<Block> {
         return Vec::new();
     };
     let values = values(data, scene);
-    let tables = [TREES, FRAME_RAYS].map(|table| table.table(&data.names, &values, &[]));
+    let bounds = bounds(data, scene);
+    let tables = [TREES, FRAME_RAYS].map(|table| table.table(&data.names, &values, &[&bounds]));
     let mut blocks = vec![
         Block::Heading("In motion".into()),
         Block::Paragraph(introduction(&first.settings)),
@@ -63,7 +64,14 @@ fn plots(data: &RunData, stem: &str, scene: &SceneGroup, values: &[Value]) -> Op
     let rays = ["", first.map_or("", shown)];
     let is_shown = |v: &&Value| rays.contains(&v.key.label(axis::RAYS));
     let values: Vec<Value> = values.iter().filter(is_shown).cloned().collect();
-    Block::figures(FRAME_PLOTS.map(|plot| plot.figure(data, &values, stem, &[])))
+    Block::figures(FRAME_PLOTS.map(|plot| plot.figure(data, &values, stem, &[&bounds(data, scene)])))
+}
+
+/// Describes the bounds of what updates and builds cost.
+pub(crate) fn bounds(data: &RunData, scene: &SceneGroup) -> String {
+    let frames = scene.animations.iter().flat_map(|cell| &cell.frames);
+    let costs = frames.flat_map(|frame| [&frame.refit, &frame.rebuild]);
+    format::median_bounds(costs.map(|cost| cost.ms(is_software(data)).len()))
 }
 
 fn is_software(data: &RunData) -> bool {

@@ -3,7 +3,7 @@
 use super::specs::GROWTH;
 use crate::data::{RunData, grouped};
 use crate::document::*;
-use crate::format::ABSENT;
+use crate::format::{ABSENT, median_bounds};
 use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::values::{Estimate, Value, of_readings};
@@ -156,8 +156,17 @@ fn plot(data: &RunData, parameter: &str) -> Option<Illustration> {
         other => (other, Ticks::PowersOfTwo),
     };
     let plot = CurvePlot::new(x_title, x_ticks, y_title, curves);
-    let caption = format!("{says}, against {x_title}. Bands: 95 % interval of the median.");
+    let caption = format!(
+        "{says}, against {x_title}. Lines: median, bands: {}.",
+        bounds(data)
+    );
     plot.figure(format!("compaction-{parameter}"), caption)
+}
+
+/// Describes the bounds of the medians of all compactions.
+fn bounds(data: &RunData) -> String {
+    let cells = data.measured_by(NAME).into_iter();
+    median_bounds(cells.filter_map(|cell| Some(time(&cell)?.rounds().len())))
 }
 
 /// Returns the look shared by all variants of a method.
@@ -239,7 +248,7 @@ pub(crate) fn growth_table(data: &RunData, values: &[Value]) -> Table {
     GROWTH.beside(
         &data.names,
         values,
-        &[],
+        &[&bounds(data)],
         &[":fits better"],
         growths(data).into_iter().map(row),
     )
@@ -268,7 +277,10 @@ pub(crate) fn table(data: &RunData, values: &[Value]) -> Table {
     let heads = ["method", "elements", "valid", "bytes", ":judge"];
     Rows::new(&ROW, &heads, data.measured_by(NAME).iter().map(row)).table(
         values,
-        "All compactions: median [95 % interval]. Least traffic: flags once, what stays once from and once to memory",
+        format!(
+            "All compactions: median [{}]. Least traffic: flags once, what stays once from and once to memory",
+            bounds(data)
+        ),
         &[
             &figure::COMPACTION_NS,
             &figure::COMPACTION_MELEMENTS_PER_S,

@@ -104,7 +104,9 @@ pub fn blocks(data: &RunData, scene: &SceneGroup) -> Vec<Block> {
     ];
     blocks.extend(scene.peers.iter().map(|peer| Block::Paragraph(told(peer))));
     let values = values(scene);
-    let tables = PEERS.map(|table| table.table(&data.names, &values, &[]));
+    let timings = scene.peers.iter().flat_map(|peer| &peer.timings);
+    let bounds = format::median_bounds(timings.map(|timing| timing.cpu_ms.len()));
+    let tables = PEERS.map(|table| table.table(&data.names, &values, &[&bounds]));
     blocks.extend(tables.into_iter().filter_map(Table::into_block));
     blocks
 }

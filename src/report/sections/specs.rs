@@ -68,8 +68,7 @@ pub(crate) const RECORDED_RAYS: TableSpec = TableSpec {
     figures: &[&SIMT_EFFICIENCY, &LINES_PER_ISSUE, &L1_HITS, &ISSUES_PER_RAY, &L2_BYTES_PER_RAY, &CYCLES_PER_RAY],
 };
 pub(crate) const TREES: TableSpec = TableSpec {
-    caption: "Trees frame by frame: SAH cost, and what refitting and building anew cost (median [95 % interval]); rays of each \
-              gate",
+    caption: "Trees frame by frame: SAH cost, and what refitting and building anew cost (median [{}]); rays of each gate",
     rows: &[Structure, Axis(":at", axis::SUBJECT)], across: BY_FIGURE,
     figures: &[
         &FRAME_SAH_REFITTED, &FRAME_SAH_REBUILT, &FRAME_SAH_RATIO, &FRAME_REFIT_MS, &FRAME_REFIT_HOST_MS, &FRAME_REBUILD_MS,
@@ -86,7 +85,7 @@ pub(crate) const FRAME_RAYS: TableSpec = TableSpec {
 const PEER: Head = Axis("peer", axis::PEER);
 pub(crate) const PEERS: [TableSpec; 5] = [
     TableSpec {
-        caption: "Time of all processors, ns per ray: median [95 % interval]", figures: &[&CPU_NS_PER_RAY], across: BY_RAYS,
+        caption: "Time of all processors, ns per ray: median [{}]", figures: &[&CPU_NS_PER_RAY], across: BY_RAYS,
         rows: &[PEER, Axis(":structure", axis::ACCEL), Axis(":kernels", axis::KERNELS)],
     },
     TableSpec {
@@ -97,7 +96,7 @@ pub(crate) const PEERS: [TableSpec; 5] = [
         ],
     },
     TableSpec {
-        caption: "Speed by the wall clock, Mrays/s: median [95 % interval]", figures: &[&PEER_MRAYS_PER_S], across: BY_RAYS, rows: &[PEER],
+        caption: "Speed by the wall clock, Mrays/s: median [{}]", figures: &[&PEER_MRAYS_PER_S], across: BY_RAYS, rows: &[PEER],
     },
     TableSpec {
         caption: "Rays with another triangle than the reference tracer's, or another answer, per million", figures: &[&UNLIKE_JUDGE],
@@ -210,14 +209,13 @@ pub(crate) const WORST_PAIRS: TableSpec = TableSpec {
     rows: &[Sampler, Axis(":dimensions", axis::DIMENSIONS)], figures: &[&STAR_DISCREPANCY], across: BY_FIGURE,
 };
 pub(crate) const DRAWING: TableSpec = TableSpec {
-    caption: "Cost of drawing on this adapter, nanoseconds per two-dimensional sample: median [95 % interval], empty loop taken \
-              off, all units of the adapter together",
+    caption: "Cost of drawing on this adapter, nanoseconds per two-dimensional sample: median [{}], empty loop taken off, all \
+              units of the adapter together",
     rows: &[Sampler], figures: &[&NS_PER_SAMPLE, &LOOP_NS], across: BY_FIGURE,
 };
 pub(crate) const GROWTH: TableSpec = TableSpec {
     caption: "Growth with the number of elements n: relative residuals of both models, of two constants each, and the difference \
-              of Akaike's criteria, each fitted round by round: median [95 % interval]. A model is named where the whole interval \
-              is beyond ±2",
+              of Akaike's criteria, each fitted round by round: median [{}]. A model is named where the whole interval is beyond ±2",
     rows: &[Axis("method", axis::INTEGRATOR), Axis(":kernels", axis::KERNELS)], across: BY_FIGURE,
     figures: &[&GROWTH_LINEAR, &GROWTH_LINEARITHMIC, &GROWTH_DIFFERENCE],
 };
@@ -249,7 +247,7 @@ pub(crate) const FRAME_PLOTS: [PlotSpec; 3] = [
     PlotSpec {
         name: "-animation-cost", x_title: "frame", x_ticks: Ticks::Whole, x: FRAME, curves: Structure,
         y_title: "cost of a frame, ms", figures: &[(&FRAME_REFIT_MS, ", refitted"), (&FRAME_REBUILD_MS, ", rebuilt")],
-        caption: "What refitting (full lines) and building anew (dashed) cost in each frame, median with 95 % interval.",
+        caption: "What refitting (full lines) and building anew (dashed) cost in each frame: median [{}].",
     },
     PlotSpec {
         name: "-animation-nodes", x_title: "frame", x_ticks: Ticks::Whole, x: FRAME, curves: Structure,

@@ -9,7 +9,7 @@ use crate::data::{RunData, grouped};
 use crate::document::*;
 use crate::plot::curves::Guide;
 use crate::spec::{PlotSpec, TableSpec, filled};
-use crate::values::{Value, number, of_readings, of_stream};
+use crate::values::{Value, median_bounds, number, of_readings, of_stream};
 use raystone_record::figure::{self, Figure};
 use raystone_record::{FigureAtCount, Recorded, StreamRecord, axis};
 
@@ -199,5 +199,5 @@ fn cost_table(data: &RunData) -> Table {
         .iter()
         .flat_map(|cost| of_readings(data, *cost))
         .collect();
-    DRAWING.table(&data.names, &values, &[])
+    DRAWING.table(&data.names, &values, &[&median_bounds(&values)])
 }
