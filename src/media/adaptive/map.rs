@@ -14,7 +14,7 @@ const ROUNDS: u32 = 32;
 /// photons came from, and a blur over 5² cells follows. `cells` are the pilots' cells, x fastest.
 ///
 /// # Errors
-/// The number of pilots along an axis is no power of two, or the background is not above 0.
+/// The number of pilots along an axis is no power of two, the background is not above 0, or the complement leaves nothing.
 pub fn importance(adaptive: &Adaptive, cells: &[Pilots]) -> Result<ImportanceMap, String> {
     let side = adaptive.pilots as usize;
     let mut values = vec![0.0; side * side];
@@ -30,6 +30,14 @@ pub fn importance(adaptive: &Adaptive, cells: &[Pilots]) -> Result<ImportanceMap
     }
     if adaptive.complement > 0.0 {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let least = values.iter().fold(f64::INFINITY, |a, b| a.min(*b)) / mean;
+        if adaptive.complement <= least {
+            return Err(format!(
+                "`complement` = {} leaves no photons anywhere: the map has at least {least:.3} times as many as even photons \
+                 everywhere; set it above that",
+                adaptive.complement
+            ));
+        }
         for value in &mut values {
             *value = (adaptive.complement - *value / mean).max(LEAST);
         }

@@ -199,6 +199,12 @@ fn the_map_has_a_disc_where_selected_cells_got_their_photons_from() {
         let sum = four.density(at) + 3.0 * left.density(at);
         assert!((sum - 4.0).abs() < 0.01, "{sum}");
     }
+    let nothing = Adaptive {
+        complement: 0.5,
+        ..EVEN
+    };
+    let why = importance(&nothing, &lit([5, 5], 1)).unwrap_err();
+    assert!(why.contains("leaves no photons anywhere"), "{why}");
     let odd = Adaptive { pilots: 12, ..EVEN };
     assert!(
         importance(&odd, &lit([5, 5], 1))

@@ -229,11 +229,11 @@ fn is_a_chance(taken: &Taken) -> bool {
 
 fn of_lines(lines: &[Line]) -> Vec<Taken> {
     let data = RunData::new(lines);
-    let of_seeds = of_samplers(&data);
+    let works = Works::new(&data);
     let mut all: Vec<Taken> = values(&data)
         .into_iter()
         .filter(|value| !is_derived(&value.figure.id))
-        .filter_map(|value| of_value(&data, &of_seeds, &value))
+        .filter_map(|value| of_value(&works, &value))
         .collect();
     all.extend(facts(&data));
     let failed = failed_checks(lines).into_iter();
@@ -255,7 +255,29 @@ fn of_lines(lines: &[Line]) -> Vec<Taken> {
 /// Values seed by seed, and their work.
 type Seeds = BTreeMap<Identity, (Evidence, String)>;
 
-fn of_value(data: &RunData, of_seeds: &Seeds, value: &Value) -> Option<Taken> {
+/// What the values of a run were measured on.
+pub(crate) struct Works<'a> {
+    data: &'a RunData<'a>,
+    of_seeds: Seeds,
+}
+
+impl<'a> Works<'a> {
+    pub(crate) fn new(data: &'a RunData<'a>) -> Self {
+        Self {
+            data,
+            of_seeds: of_samplers(data),
+        }
+    }
+
+    /// Describes the scene and the work of a value; values with unlike words are not comparable.
+    pub(crate) fn words(&self, value: &Value) -> String {
+        let of_seeds = self.of_seeds.get(&identity(&value.key, &value.figure));
+        let of_seeds = of_seeds.map_or("", |(_, work)| work);
+        scene_hash(self.data, &value.key) + &value.source.work + of_seeds
+    }
+}
+
+fn of_value(works: &Works, value: &Value) -> Option<Taken> {
     let number = match value.estimate {
         Estimate::Known(interval) | Estimate::HeavyTailed(interval) => interval,
         Estimate::Below(bound) => Interval {
@@ -269,19 +291,18 @@ fn of_value(data: &RunData, of_seeds: &Seeds, value: &Value) -> Option<Taken> {
         key: value.key.clone(),
         figure: value.figure.clone().into_owned(),
         shown: value.cell().text,
-        evidence: evidence(data, value, number),
-        work: scene_hash(data, &value.key) + &value.source.work,
+        evidence: evidence(works.data, value, number),
+        work: works.words(value),
         seed: None,
         kernel: value.source.kernel.to_owned(),
     };
     if value.is_heavy_tailed() {
         own.evidence = Evidence::Untrusted(number);
     }
-    if let Some((evidence, work)) = of_seeds.get(&own.identity()) {
-        if !value.is_heavy_tailed() {
-            own.evidence = evidence.clone();
-        }
-        own.work += work;
+    if let Some((evidence, _)) = works.of_seeds.get(&own.identity())
+        && !value.is_heavy_tailed()
+    {
+        own.evidence = evidence.clone();
     }
     Some(own)
 }

@@ -4,6 +4,7 @@
 pub mod change;
 pub mod page;
 
+use crate::compare::taken::Works;
 use crate::data::RunData;
 use crate::export::ExportError;
 use crate::export::select::Selection;
@@ -54,6 +55,8 @@ pub struct Series<'a> {
     pub figure: Cow<'a, Figure>,
     /// The device.
     pub device: String,
+    /// The scene and the work that was measured: a series never mixes different ones.
+    pub work: String,
     /// Run and value, in order of time.
     pub points: Vec<(usize, Interval)>,
     /// Changes of the level.
@@ -69,7 +72,7 @@ pub struct History<'a> {
     pub runs: Vec<Run>,
     /// The series, in the order of the records.
     pub series: Vec<Series<'a>>,
-    /// Number of values that are not finite numbers.
+    /// Number of values that are no finite numbers, or have no interval to be trusted.
     pub left_out: usize,
 }
 
@@ -90,13 +93,15 @@ impl<'a> History<'a> {
         // A single run may lack a figure: the choice is checked against all runs together.
         choice.of(found.concat())?;
         let mut history = Self::default();
-        for (number, (run, values)) in data.iter().map(|(run, _)| run).zip(found).enumerate() {
+        for (number, ((run, data), values)) in data.iter().zip(found).enumerate() {
             history.runs.push(run.clone());
+            let works = Works::new(data);
             let ranks =
                 |figure: &Figure| !choice.is_of_all_figures() || figure.better != Better::Neither;
             for value in values {
                 if choice.keeps(&value.key, &value.figure.id) && ranks(&value.figure) {
-                    history.add(number, &run.device, value);
+                    let work = works.words(&value);
+                    history.add(number, &run.device, work, value);
                 }
             }
         }
@@ -106,7 +111,7 @@ impl<'a> History<'a> {
         Ok(history)
     }
 
-    fn add(&mut self, run: usize, device: &str, value: Value<'a>) {
+    fn add(&mut self, run: usize, device: &str, work: String, value: Value<'a>) {
         let point = match value.estimate {
             Estimate::Known(interval) if interval.value.is_finite() => (run, interval),
             _ => {
@@ -116,6 +121,7 @@ impl<'a> History<'a> {
         };
         let is_it = |series: &&mut Series| {
             series.device == device
+                && series.work == work
                 && series.figure.id == value.figure.id
                 && series.key == value.key
         };
@@ -125,6 +131,7 @@ impl<'a> History<'a> {
                 key: value.key,
                 figure: value.figure,
                 device: device.to_owned(),
+                work,
                 points: vec![point],
                 changes: Vec::new(),
                 tested: false,

@@ -41,7 +41,7 @@ impl History<'_> {
             let p = change.p.map_or_else(|| "exact".to_owned(), format::number);
             [
                 series.figure.heading().into(),
-                series.key.to_string().into(),
+                self.name(series).into(),
                 run.map_or("", |run| short(&run.commit)).into(),
                 change.run.to_string().into(),
                 text(change.before),
@@ -53,6 +53,18 @@ impl History<'_> {
         let series = self.series.iter();
         let changes = series.flat_map(|s| s.changes.iter().map(move |change| (s, change)));
         Table::of("Changes", &heads, changes.map(row))
+    }
+
+    /// Names the key of a series, and its work where another has the same key.
+    fn name(&self, series: &Series) -> String {
+        let is_like = |other: &&Series| {
+            (&other.figure.id, &other.key) == (&series.figure.id, &series.key)
+                && other.work != series.work
+        };
+        match self.series.iter().find(is_like) {
+            Some(_) => format!("{} ({})", series.key, series.work),
+            None => series.key.to_string(),
+        }
     }
 
     /// Summarises the tested and untested series and the expected false alarms.
@@ -143,6 +155,7 @@ impl History<'_> {
                 "better": series.figure.better,
                 "key": series.key,
                 "device": series.device,
+                "work": series.work,
                 "tested": series.tested,
                 "points": points.collect::<Vec<Json>>(),
                 "changes": series.changes,
@@ -159,6 +172,7 @@ impl History<'_> {
 
 fn plot(series: &[&Series]) -> CurvePlot {
     let several = series.iter().any(|s| s.device != series[0].device);
+    let works = series.iter().any(|s| s.work != series[0].work);
     let shared = shared(series);
     let mut curves = Vec::new();
     for (look, series) in series.iter().enumerate() {
@@ -168,6 +182,7 @@ fn plot(series: &[&Series]) -> CurvePlot {
             .filter(|(axis, _)| shared.get(axis).is_none());
         let mut own: Vec<&str> = own.map(|(_, label)| label).collect();
         own.extend(several.then_some(series.device.as_str()));
+        own.extend(works.then_some(series.work.as_str()));
         let label = if own.is_empty() {
             series.key.to_string()
         } else {

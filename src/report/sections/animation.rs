@@ -64,7 +64,9 @@ fn plots(data: &RunData, stem: &str, scene: &SceneGroup, values: &[Value]) -> Op
     let rays = ["", first.map_or("", shown)];
     let is_shown = |v: &&Value| rays.contains(&v.key.label(axis::RAYS));
     let values: Vec<Value> = values.iter().filter(is_shown).cloned().collect();
-    Block::figures(FRAME_PLOTS.map(|plot| plot.figure(data, &values, stem, &[&bounds(data, scene)])))
+    Block::figures(
+        FRAME_PLOTS.map(|plot| plot.figure(data, &values, stem, &[&bounds(data, scene)])),
+    )
 }
 
 /// Describes the bounds of what updates and builds cost.

@@ -283,3 +283,38 @@ fn a_change_is_in_the_run_that_shows_it_even_if_the_first_run_lacks_the_figure()
     let changes: Vec<usize> = changes.map(|change| change.run).collect();
     assert_eq!(changes, [2]);
 }
+
+#[test]
+fn runs_with_other_work_are_in_another_series_that_says_so() {
+    let of_run = |number: u64| {
+        let mut lines = vec![run(), structure("cornell-box", "bvh", 88.0, 0)];
+        for line in &mut lines {
+            match &mut line.body {
+                Body::Run(record) => record.started_unix_s = 100 * number,
+                Body::Structure(record) if number >= 8 => {
+                    for timing in &mut record.timings {
+                        timing.rays *= 2;
+                        timing.mrays_s = timing.mrays_s.scaled(0.5);
+                    }
+                }
+                _ => {}
+            }
+        }
+        (std::path::PathBuf::from(format!("run-{number}")), lines)
+    };
+    let all: Vec<_> = (0..16).map(of_run).collect();
+    let speed = Selection::new(&["mrays-per-s".to_owned()], &[]).unwrap();
+    let history = crate::history::History::new(&all, &speed).unwrap();
+    assert_eq!(history.series.len(), 2 * CLASSES.len());
+    assert!(history.series.iter().all(|series| series.points.len() == 8));
+    assert!(
+        history
+            .series
+            .iter()
+            .all(|series| series.changes.is_empty())
+    );
+    let json = history.json();
+    assert_eq!(json["series"][0]["work"], "32768 rays");
+    let page = crate::html::page(&history.document()).unwrap();
+    assert!(page.contains("65536 rays"), "{page}");
+}

@@ -39,15 +39,20 @@ pub(super) static DIRECTIONAL: LightChecks = LightChecks {
 };
 
 fn spots() -> Vec<Light> {
-    let spot = |x: f32, decay| Light::Spot {
+    let spot = |x: f32, inner, decay| Light::Spot {
         position: vec3(x, 2.5, 1.0),
         direction: vec3(-0.5 * x, -1.6, -0.6),
         intensity: vec3(2.0, 3.0, 2.5),
-        inner: 0.25,
+        inner,
         outer: 0.6,
         decay,
     };
-    vec![spot(0.8, true), spot(-0.9, false)]
+    // The last is nearly sharp: its cosines differ by 0.008.
+    vec![
+        spot(0.8, 0.25, true),
+        spot(-0.9, 0.25, false),
+        spot(0.1, 0.585, true),
+    ]
 }
 
 /// Distance of lights at infinity.
