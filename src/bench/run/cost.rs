@@ -303,6 +303,21 @@ mod tests {
     }
 
     #[test]
+    fn only_work_that_there_is_is_described() {
+        let said = Work::other(7.0).describe();
+        assert!(said.contains("two cores, from 7 s of loading"), "{said}");
+        let work = Work {
+            rays: 3e6,
+            kernels: 1.0,
+            ..Work::other(7.0)
+        };
+        let said = work.describe();
+        let parts = "from 3.0 million rays at 2 million a second, 1 kernel that the driver compiles in 0.3 s each, and 7 s";
+        assert!(said.contains(parts), "{said}");
+        assert!(!said.contains("elements"), "{said}");
+    }
+
+    #[test]
     fn times_are_rounded_up_to_whole_units() {
         assert_eq!(duration(41.2), "42 s");
         assert_eq!(duration(121.0), "3 min");

@@ -80,7 +80,7 @@ pub(crate) const FRAME_RAYS: TableSpec = TableSpec {
     caption: "Rays frame by frame: nodes visited and time in the refitted tree over those in the tree built anew, and from how \
               many million rays of a class on building anew pays in that frame (none: its rays are slower; unresolved: the \
               interval of the difference holds 0; any: it costs no more; few: \
-              nor does it, but its rays are slower)",
+              it costs no more, but its rays are slower)",
     rows: &[Structure, Axis(":at", axis::SUBJECT)], across: BY_RAYS,
     figures: &[&FRAME_NODES_RATIO, &FRAME_TIME_RATIO, &FRAME_BREAK_EVEN],
 };

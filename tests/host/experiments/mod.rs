@@ -126,6 +126,8 @@ fn a_filter_that_leaves_out_what_a_condition_does_leaves_nothing_to_be_told() {
     assert_eq!(told(&[]), 2);
     assert_eq!(told(&["sequence=sobol"]), 1);
     assert_eq!(told(&["scene=displaced-sphere"]), 0);
+    let one = plan(&experiment, &["sequence=sobol"]).unwrap().describe();
+    assert!(one.contains(" (1 cell): "), "{one}");
 }
 
 #[test]
