@@ -127,6 +127,12 @@ pub fn as_typed(message: String, flags: &[String]) -> String {
         let typed = match key.split_once('.') {
             Some(("run", "resolution")) => "size",
             Some(("axes" | "run" | "gate" | "stress", name)) => name,
+            // Of `points`, which has no other way to set them.
+            Some(("sequence" | "decorrelation", of)) => {
+                let name = of.rsplit('.').next().unwrap_or_default();
+                let value = &flag[key.len()..];
+                return text.replace(&format!("--set {flag}"), &format!("--param {name}{value}"));
+            }
             _ => return text,
         };
         text.replace(&format!("--set {flag}"), &format!("--{typed}"))
@@ -245,5 +251,18 @@ mod tests {
         let given = ["bvh(leaf_size=2,builder=sbvh), cwbvh", "kd-tree"].map(str::to_owned);
         let names: Vec<_> = listed(&given).collect();
         assert_eq!(names, ["bvh(leaf_size=2,builder=sbvh)", "cwbvh", "kd-tree"]);
+    }
+
+    #[test]
+    fn what_was_typed_is_named_and_not_what_it_stands_for() {
+        for (flag, typed) in [
+            ("sequence.halton.digits=a=b", "--param digits=a=b"),
+            ("decorrelation.micro-jitter.k=x", "--param k=x"),
+            ("run.resolution=[0,1]", "--size"),
+            ("axes.accel=['bvx']", "--accel"),
+        ] {
+            let said = as_typed(format!("--set {flag}: wrong"), &[flag.to_owned()]);
+            assert_eq!(said, format!("{typed}: wrong"));
+        }
     }
 }

@@ -116,10 +116,12 @@ impl Compare {
             match self.confirm([&base, &candidate], &cells, &work) {
                 Ok(confirmed) => {
                     found = compare_sides(&base, &candidate, &options, &confirmed);
-                    found.notes.push(format!(
-                        "{} times looked slower and were measured again, side by side.",
-                        cells.len()
-                    ));
+                    found.notes.push(match cells.len() {
+                        1 => "1 time looked slower and was measured again, side by side.".into(),
+                        n => format!(
+                            "{n} times looked slower and were measured again, side by side."
+                        ),
+                    });
                     found.not_confirmed("the runs side by side have no times of it");
                 }
                 Err(why) => found.not_confirmed(&format!("{why:#}")),
@@ -221,10 +223,11 @@ impl Compare {
         }
         let cells: Vec<&Finding> = cells.iter().collect();
         if let Some(program) = &self.base_program {
-            tell(&format!(
-                "{} times look worse: measuring them again with both programs in turns",
-                cells.len()
-            ));
+            let worse = match cells.len() {
+                1 => "1 time looks worse: measuring it".to_owned(),
+                n => format!("{n} times look worse: measuring them"),
+            };
+            tell(&format!("{worse} again with both programs in turns"));
             let own = std::env::current_exe().context("cannot tell this program's own path")?;
             let programs: [&Path; 2] = [program, &own];
             let rounds = self.rounds.unwrap_or(8);

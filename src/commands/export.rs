@@ -9,6 +9,7 @@ use raystone::atomic::write_atomic;
 use raystone::export::select::Selection;
 use raystone::export::{FORMATS, Format, Source, Writer};
 use raystone::measure::record::read_records;
+use raystone::report::format::plural;
 use raystone::run::records_in;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -127,7 +128,11 @@ impl Export {
                 for line in &files.left_out {
                     warn(line);
                 }
-                tell(&format!("{} files in {}", files.count, folder.display()));
+                tell(&format!(
+                    "{} in {}",
+                    plural(files.count, "file"),
+                    folder.display()
+                ));
             }
         }
         Ok(())

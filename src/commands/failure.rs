@@ -1,6 +1,6 @@
 //! Failure of a command: one sentence on standard error and an exit code.
 
-use super::output::tell_marked;
+use super::output::{tell, tell_marked};
 use raystone::gpu::GpuError;
 use raystone::run::RunError;
 use std::process::ExitCode;
@@ -29,11 +29,34 @@ pub fn tell_error(error: &anyhow::Error) {
 /// Writes an error; returns the exit code.
 pub fn end(error: anyhow::Error) -> ExitCode {
     tell_error(&error);
+    if error.chain().any(is_no_adapter) {
+        let asked = std::env::var(BACKEND).unwrap_or_default();
+        narrowed(&asked).iter().for_each(|hint| tell(hint));
+    }
     let code = match error.downcast::<GpuError>() {
         Ok(error) => RunError::from(error).exit_code(),
         Err(error) => error.downcast_ref().map_or(BAD_INPUT, RunError::exit_code),
     };
     ExitCode::from(code)
+}
+
+/// The variable that leaves out all other backends.
+const BACKEND: &str = "WGPU_BACKEND";
+
+fn is_no_adapter(cause: &(dyn std::error::Error + 'static)) -> bool {
+    let of_run = match cause.downcast_ref() {
+        Some(RunError::Gpu(error)) => Some(error),
+        _ => None,
+    };
+    matches!(cause.downcast_ref().or(of_run), Some(GpuError::NoAdapter))
+}
+
+/// Returns the line that says that another backend was asked for.
+fn narrowed(asked: &str) -> Option<String> {
+    let line = format!(
+        "{BACKEND}={asked} leaves out all other backends (there are vulkan, gl, metal and dx12): try without it"
+    );
+    (!asked.is_empty()).then_some(line)
 }
 
 /// Joins the chain of causes by colons, without those that the sentence already holds: many messages quote their
@@ -48,4 +71,24 @@ fn sentence(cause: &anyhow::Error) -> String {
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_backend_that_was_asked_for_is_named_where_no_adapter_answers() {
+        assert_eq!(narrowed(""), None);
+        let hint = narrowed("vulcan").unwrap_or_default();
+        assert!(hint.starts_with("WGPU_BACKEND=vulcan "), "{hint}");
+        let run = anyhow::Error::from(RunError::from(GpuError::NoAdapter));
+        assert!(run.chain().any(is_no_adapter));
+        assert!(
+            anyhow::Error::from(GpuError::NoAdapter)
+                .chain()
+                .any(is_no_adapter)
+        );
+        assert!(!anyhow::anyhow!("another").chain().any(is_no_adapter));
+    }
 }

@@ -5,6 +5,7 @@ use super::output::{OutputArguments, tell, warn};
 use anyhow::Result;
 use clap::Args;
 use raystone::measure::record::{RunRecord, all_of, read_records};
+use raystone::report::format::plural;
 use raystone::report::{failed_checks, write_report};
 use raystone::run::merge;
 use serde_json::json;
@@ -48,7 +49,8 @@ impl Merge {
             "report": page,
         });
         let (folders, page) = (self.dirs.len(), page.display());
-        let text = format!("{cells} cells of {folders} folders\n\nreport: {page}\n");
+        let joined = [plural(cells, "cell"), plural(folders, "folder")].join(" of ");
+        let text = format!("{joined}\n\nreport: {page}\n");
         self.output.show("merge", fields, &text)?;
         // As of the run that was divided.
         let is_lenient = all_of::<RunRecord>(&lines)

@@ -51,6 +51,17 @@ pub struct Repro {
     output: OutputArguments,
 }
 
+/// Returns the folder of models. One that was named has to be there: without its models hours of runs would say little.
+fn folder_of_models(named: Option<&Path>) -> Result<PathBuf> {
+    if let Some(folder) = named.filter(|folder| !folder.is_dir()) {
+        let folder = folder.display();
+        bail!(
+            "--scenes {folder}: there is no such folder; `raystone list model` names the models that belong in it"
+        );
+    }
+    Ok(scenes::directory(named))
+}
+
 impl Repro {
     pub fn execute(self) -> Result<ExitCode> {
         let sources = chosen(&self.name).map_err(|problem| anyhow!(problem))?;
@@ -65,7 +76,7 @@ impl Repro {
         let mut settings = Settings {
             quick: self.quick,
             software: false,
-            scenes: scenes::directory(self.scenes.as_deref()),
+            scenes: folder_of_models(self.scenes.as_deref())?,
             out: self
                 .out
                 .clone()
@@ -263,4 +274,22 @@ fn list(sources: &[Source], not_covered: &NotCovered) -> Result<String> {
         text += &format!("{}\n    {}: {}\n", table.name, table.title, table.why);
     }
     Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_of_models_that_was_named_has_to_be_there() {
+        let there = std::env::temp_dir();
+        assert_eq!(folder_of_models(Some(&there)).unwrap(), there);
+        let missing = there.join("no such folder of models");
+        let said = folder_of_models(Some(&missing)).unwrap_err().to_string();
+        assert!(
+            said.starts_with("--scenes ") && said.contains("no such folder"),
+            "{said}"
+        );
+        assert!(folder_of_models(None).is_ok());
+    }
 }

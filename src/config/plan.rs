@@ -23,7 +23,7 @@ pub struct Skipped {
     pub cell: String,
     /// The reason.
     pub reason: String,
-    /// Their number (full cells for an exclude).
+    /// Their number: of an exclude or a condition, the full cells that none before it left out.
     pub cells: usize,
 }
 
@@ -89,16 +89,16 @@ impl Plan {
         let variants = shared(axes);
         let is_randomised = asked_once(is_randomised);
         let full = product(&variants, &Cell::FULL);
+        let mut wanted = full.clone();
+        wanted.retain(|point| point.fits(&filter));
         let mut skipped = Vec::new();
         for exclude in &experiment.excludes {
-            skipped.extend(excluded(exclude, experiment, &full, &filter)?);
+            skipped.extend(excluded(exclude, experiment, &full, &mut wanted)?);
         }
         for include in &experiment.includes {
             included(include, &full)?;
         }
-        skipped.extend(unmet(experiment, &full, &filter));
-        let mut wanted = full;
-        wanted.retain(|point| is_wanted(experiment, &filter, point));
+        skipped.extend(unmet(experiment, &mut wanted));
         let refused = refused(&wanted, &is_randomised);
         let renders = !axes[Axis::Integrator].iter().all(is_bench);
         let cells = |which: &[Axis]| -> Vec<Cell> {
@@ -256,7 +256,8 @@ impl Plan {
         let axes = [Axis::Integrator, Axis::Kernels];
         let benches = self.benches_on(&axes);
         if !benches.is_empty() {
-            writeln!(text, "{} things to measure without a scene:", benches.len())?;
+            let things = plural(benches.len(), "thing");
+            writeln!(text, "{things} to measure without a scene:")?;
         }
         for cell in &benches {
             writeln!(text, "  {cell}")?;
@@ -267,7 +268,8 @@ impl Plan {
                 reason,
                 cells,
             } = skipped;
-            writeln!(text, "left out: {cell} ({cells} cells): {reason}")?;
+            let cells = plural(*cells, "cell");
+            writeln!(text, "left out: {cell} ({cells}): {reason}")?;
         }
         writeln!(
             text,
@@ -298,7 +300,7 @@ fn no_structure(cell: &Cell) -> Skipped {
     }
 }
 
-/// A number with its noun.
-fn plural(count: usize, noun: &str) -> String {
+/// A number with its noun: `1 cell`, `3 cells`.
+pub fn plural(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }

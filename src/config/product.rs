@@ -105,16 +105,14 @@ pub(super) fn refused(full: &[Point], is_randomised: &impl IsRandomised) -> Vec<
     out
 }
 
-/// The cells that one exclude removes from the filtered product.
+/// Removes the cells of one exclude from those that are still wanted.
 pub(super) fn excluded(
     exclude: &CellSet,
     experiment: &Experiment,
     full: &[Point],
-    filter: &Selector,
+    wanted: &mut Vec<Point>,
 ) -> Result<Option<Skipped>, ConfigError> {
-    let covered = full.iter().filter(|point| exclude.covers(point));
-    let covered: Vec<_> = covered.collect();
-    if covered.is_empty() && !exclude.lenient {
+    if !exclude.lenient && !full.iter().any(|point| exclude.covers(point)) {
         return Err(ConfigError::UselessExclude {
             at: exclude.at.clone(),
             section: "exclude",
@@ -122,8 +120,9 @@ pub(super) fn excluded(
         });
     }
     let includes = &experiment.includes;
-    let is_out = |point: &&&Point| point.fits(filter) && !includes.iter().any(|i| i.touches(point));
-    let cells = covered.iter().filter(is_out).count();
+    let is_out =
+        |point: &Point| exclude.covers(point) && !includes.iter().any(|i| i.touches(point));
+    let cells = removed(wanted, is_out);
     Ok((cells > 0).then(|| Skipped {
         cell: exclude.to_string(),
         reason: format!("excluded by {}", exclude.at),
@@ -144,11 +143,17 @@ pub(super) fn included(include: &CellSet, full: &[Point]) -> Result<(), ConfigEr
     }
 }
 
-/// The cells that variant conditions remove from the filtered product.
-pub(super) fn unmet(experiment: &Experiment, full: &[Point], filter: &Selector) -> Vec<Skipped> {
+/// Removes such cells, each of which is counted once however many rules fit it; returns their number.
+fn removed(wanted: &mut Vec<Point>, is_out: impl Fn(&Point) -> bool) -> usize {
+    let before = wanted.len();
+    wanted.retain(|point| !is_out(point));
+    before - wanted.len()
+}
+
+/// Removes the cells that conditions of variants exclude from those that are still wanted.
+pub(super) fn unmet(experiment: &Experiment, wanted: &mut Vec<Point>) -> Vec<Skipped> {
     let skipped = experiment.conditions.iter().filter_map(|condition| {
-        let is_out = |point: &&Point| point.fits(filter) && !condition.allows(point);
-        let cells = full.iter().filter(is_out).count();
+        let cells = removed(wanted, |point| !condition.allows(point));
         let sets: Vec<String> = condition.cells.iter().map(CellSet::to_string).collect();
         (cells > 0).then(|| Skipped {
             cell: format!("{} {}", condition.axis, condition.label),

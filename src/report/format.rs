@@ -130,14 +130,23 @@ pub fn figure(figure: &Figure, value: f64) -> String {
     }
 }
 
-/// Formats a share as whole percent, one decimal below ten.
+/// Formats a share as whole percent, one decimal below ten. Only nothing is `0.0 %` and only all of it `100 %`: what lies
+/// next to them has the digits that tell it from them.
 pub(crate) fn percent(share: f64) -> String {
     let value = share * 100.0;
-    if value.abs() < 10.0 {
-        format!("{value:.1} %")
-    } else {
-        format!("{value:.0} %")
-    }
+    let size = value.abs();
+    let digits = match size {
+        _ if !value.is_finite() => return ABSENT.into(),
+        0.0 => return "0.0 %".into(),
+        ..0.05 => return format!("{} %", significant(value, 1)),
+        ..9.95 => 1,
+        99.5..100.0 => {
+            let is_below = |digits: &usize| !format!("{size:.digits$}").starts_with("100");
+            (1..10).find(is_below).unwrap_or(0)
+        }
+        _ => 0,
+    };
+    format!("{value:.digits$} %").replace('-', "−")
 }
 
 /// Formats `1 sampler`, `3 samplers`.
@@ -207,7 +216,30 @@ mod tests {
         assert_eq!(optional(None), "–");
         assert_eq!([count(262_267), count(100)], ["262,267", "100"]);
         assert_eq!([bytes(1023), bytes(3 << 20)], ["1023 B", "3.00 MiB"]);
-        assert_eq!(percent(0.043), "4.3 %");
+    }
+
+    #[test]
+    fn only_all_of_it_is_a_hundred_percent_and_only_nothing_is_none() {
+        for (share, text) in [
+            (0.0, "0.0 %"),
+            (-0.0, "0.0 %"),
+            (0.0004, "0.04 %"),
+            (1.7e-8, "2·10⁻⁶ %"),
+            (0.0006, "0.1 %"),
+            (0.043, "4.3 %"),
+            (-0.043, "−4.3 %"),
+            (0.0996, "10 %"),
+            (0.1, "10 %"),
+            (0.994, "99 %"),
+            (0.9968, "99.7 %"),
+            (0.999_938_96, "99.99 %"),
+            (1.0, "100 %"),
+            (1.0 - f64::EPSILON, "100 %"),
+            (1.004, "100 %"),
+            (f64::NAN, "–"),
+        ] {
+            assert_eq!(percent(share), text, "{share}");
+        }
     }
 
     #[test]

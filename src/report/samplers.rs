@@ -404,10 +404,10 @@ impl View<'_> {
         (share.is_nan() || share > REFERENCE_SHARE).then(|| {
             let enough = f64::from(reference.spp) * share / REFERENCE_SHARE;
             format!(
-                "the reference has {} of the least {what}, more than {}: \
+                "the reference has {} % of the least {what}, more than {} %: \
                  `reference.spp = {}` would be enough",
-                format::percent(share),
-                format::percent(REFERENCE_SHARE),
+                format::number(100.0 * share),
+                100.0 * REFERENCE_SHARE,
                 rounded_up(enough)
             )
         })

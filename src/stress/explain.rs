@@ -43,7 +43,7 @@ pub fn explain(
     // Writing to a string cannot fail.
     let _ = writeln!(
         text,
-        "\n{} nodes or cells, {} box tests, {} triangle tests, stack {}",
+        "\nnodes or cells {}, box tests {}, triangle tests {}, stack {}",
         counters.nodes, counters.box_tests, counters.triangle_tests, counters.stack_high_water
     );
     let expected = bench::Expected::new(soup, &[*ray]);

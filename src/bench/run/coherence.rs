@@ -183,7 +183,7 @@ fn rays(
         let count = [settings.groups, settings.warps];
         let groups = groups_of(size, settings.warp, count, estimator.sampler.stride());
         let image = path_oracle::View {
-            estimator: path_oracle::Estimator::of(&estimator.integrator)?,
+            estimator: path_oracle::Estimator::of(&estimator.integrator).map_err(no_model)?,
             camera: world.camera,
             size,
             sampler: &estimator.sampler,
@@ -199,6 +199,11 @@ fn rays(
         all.push((spp, rays));
     }
     Ok(all)
+}
+
+/// Why nothing is modelled, of what the path oracle does not know.
+fn no_model(unknown: String) -> String {
+    format!("the model does not follow the rays of {unknown}")
 }
 
 /// So many of the indices below `spp`, evenly spread from the first on.

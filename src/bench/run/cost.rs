@@ -1,6 +1,6 @@
 //! Cost estimate of a plan, used by `--dry-run`, the remaining time, and balanced shards.
 
-use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS};
+use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS, plural};
 use raystone_core::params::Variant;
 use raystone_render::IntegratorRegistry;
 use raystone_sampling::dimensions::{FIRST_BOUNCE, PER_BOUNCE};
@@ -70,24 +70,36 @@ impl Work {
 
     /// Describes the work for `--dry-run`.
     pub fn describe(&self) -> String {
-        let elements = match self.elements {
-            0.0 => String::new(),
-            elements => format!(
-                "{} million elements to be compacted at {} million a second, ",
-                millions(elements),
-                ELEMENTS_PER_SECOND / 1e6
-            ),
+        let at = |count: f64, what: &str, per_second: f64| {
+            let (count, rate) = (millions(count), per_second / 1e6);
+            format!("{count} million {what} at {rate} million a second, ")
         };
+        let parts = [
+            (self.rays, at(self.rays, "rays", RAYS_PER_SECOND)),
+            (
+                self.elements,
+                at(
+                    self.elements,
+                    "elements to be compacted",
+                    ELEMENTS_PER_SECOND,
+                ),
+            ),
+            (
+                self.kernels,
+                format!(
+                    "{} that the driver compiles in {SECONDS_PER_KERNEL} s each, ",
+                    plural(self.kernels as usize, "kernel")
+                ),
+            ),
+        ];
+        let parts = parts.into_iter().filter(|(count, _)| *count > 0.0);
+        let parts: String = parts.map(|(_, text)| text).collect();
+        let and = if parts.is_empty() { "" } else { "and " };
         format!(
-            "estimate: about {} on a software adapter with two cores, from {} million rays at \
-             {} million a second, {elements}\
-             {} kernels that the driver compiles in {SECONDS_PER_KERNEL} s each, and {:.0} s of \
+            "estimate: about {} on a software adapter with two cores, from {parts}{and}{:.0} s of \
              loading, building, checks and warm-up. These are round figures, nothing was measured here: a GPU needs a \
              small part of it. The report comes on top.",
             duration(self.seconds()),
-            millions(self.rays),
-            RAYS_PER_SECOND / 1e6,
-            self.kernels,
             self.other_s,
         )
     }
@@ -288,6 +300,21 @@ mod tests {
         let [primary, ao, path] = ["primary", "ao", "path"]
             .map(|name| estimate(&[&format!("axes.integrator={name}")]).rays);
         assert!(primary < ao && ao < path, "{primary} {ao} {path}");
+    }
+
+    #[test]
+    fn only_work_that_there_is_is_described() {
+        let said = Work::other(7.0).describe();
+        assert!(said.contains("two cores, from 7 s of loading"), "{said}");
+        let work = Work {
+            rays: 3e6,
+            kernels: 1.0,
+            ..Work::other(7.0)
+        };
+        let said = work.describe();
+        let parts = "from 3.0 million rays at 2 million a second, 1 kernel that the driver compiles in 0.3 s each, and 7 s";
+        assert!(said.contains(parts), "{said}");
+        assert!(!said.contains("elements"), "{said}");
     }
 
     #[test]

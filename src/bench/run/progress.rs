@@ -9,11 +9,13 @@ use super::options::RunOptions;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
 use std::time::{Duration, Instant};
 
 const STEPS: u64 = 1000;
 /// Interval of progress lines without a terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
+const BETWEEN_LOOKS: Duration = Duration::from_millis(500);
 /// Share of a run that counts as done at the expected pace.
 const PRIOR: f64 = 0.1;
 
@@ -24,6 +26,8 @@ struct Shared {
     expected_s: f64,
     done_s: f64,
     told: Instant,
+    /// What is under way.
+    message: String,
 }
 
 impl Shared {
@@ -39,6 +43,20 @@ impl Shared {
         let pace = (so_far + prior) / (self.done_s + prior);
         let left = (self.expected_s - self.done_s).max(0.005 * self.expected_s);
         (pace * left).max(1.0)
+    }
+
+    /// The next line for those without a terminal, if it is time for one.
+    fn line(&mut self) -> Option<String> {
+        if self.message.is_empty() || self.told.elapsed() < BETWEEN_LINES {
+            return None;
+        }
+        self.told = Instant::now();
+        let share = 100.0 * self.share();
+        let [so_far, left] = [self.start.elapsed().as_secs_f64(), self.left_s()].map(duration);
+        let message = &self.message;
+        Some(format!(
+            "{share:.0} % after {so_far}, about {left} left: {message}"
+        ))
     }
 }
 
@@ -58,6 +76,7 @@ impl Progress {
             expected_s: 0.0,
             done_s: 0.0,
             told: Instant::now(),
+            message: String::new(),
         }));
         let bar = if options.progress {
             ProgressBar::new(STEPS)
@@ -77,11 +96,11 @@ impl Progress {
         if options.progress {
             bar.enable_steady_tick(Duration::from_millis(500));
         }
-        Self {
-            bar,
-            shared,
-            tell: options.tell.filter(|_| !options.progress),
+        let tell = options.tell.filter(|_| !options.progress);
+        if let Some(tell) = tell {
+            tell_meanwhile(&shared, &bar, tell);
         }
+        Self { bar, shared, tell }
     }
 
     /// Sets the expected total time in seconds.
@@ -102,20 +121,35 @@ impl Progress {
     }
 
     pub(super) fn say(&self, message: String) {
+        lock(&self.shared).message.clone_from(&message);
         if let Some(tell) = self.tell {
-            let mut shared = lock(&self.shared);
-            if shared.told.elapsed() >= BETWEEN_LINES {
-                shared.told = Instant::now();
-                let share = 100.0 * shared.share();
-                let [so_far, left] =
-                    [shared.start.elapsed().as_secs_f64(), shared.left_s()].map(duration);
-                tell(&format!(
-                    "{share:.0} % after {so_far}, about {left} left: {message}"
-                ));
-            }
+            tell_if_due(&self.shared, tell);
         }
         self.bar.set_message(message);
     }
+}
+
+fn tell_if_due(shared: &Mutex<Shared>, tell: fn(&str)) {
+    let line = lock(shared).line();
+    if let Some(line) = line {
+        tell(&line);
+    }
+}
+
+/// Tells lines while a step lasts, until the run has ended.
+fn tell_meanwhile(shared: &Arc<Mutex<Shared>>, bar: &ProgressBar, tell: fn(&str)) {
+    let (shared, bar) = (Arc::downgrade(shared), bar.downgrade());
+    let until_the_end = move || {
+        loop {
+            thread::sleep(BETWEEN_LOOKS);
+            match (shared.upgrade(), bar.upgrade()) {
+                (Some(shared), Some(bar)) if !bar.is_finished() => tell_if_due(&shared, tell),
+                _ => return,
+            }
+        }
+    };
+    // Where there are no threads, lines come between steps alone.
+    let _ = thread::Builder::new().spawn(until_the_end);
 }
 
 fn lock(shared: &Mutex<Shared>) -> MutexGuard<'_, Shared> {
@@ -142,6 +176,7 @@ mod tests {
             expected_s,
             done_s,
             told: now,
+            message: String::new(),
         }
     }
 
@@ -162,6 +197,42 @@ mod tests {
             assert!((1.0..10.0).contains(&left), "{left}");
         }
         assert!(shared(0.0, 0.0, 0).left_s() >= 1.0);
+    }
+
+    #[test]
+    fn a_step_that_lasts_is_told_while_it_does() {
+        static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+        let told = || TOLD.lock().unwrap().clone();
+        let progress = Progress::new(&RunOptions {
+            tell: Some(|line| TOLD.lock().unwrap().push(line.to_owned())),
+            ..RunOptions::default()
+        });
+        progress.expect(10.0);
+        let wait = || {
+            let mut shared = lock(&progress.shared);
+            shared.told = Instant::now().checked_sub(BETWEEN_LINES).unwrap();
+            drop(shared);
+            thread::sleep(4 * BETWEEN_LOOKS);
+        };
+        // Before the first message there is nothing to tell.
+        wait();
+        assert!(told().is_empty());
+        progress.say("timing".to_owned());
+        progress.add(4.0);
+        wait();
+        let lines = told();
+        assert!(!lines.is_empty());
+        assert!(
+            lines.iter().all(|line| line.ends_with(" left: timing")),
+            "{lines:?}"
+        );
+        assert!(
+            lines[lines.len() - 1].starts_with("40 % after "),
+            "{lines:?}"
+        );
+        progress.bar.finish_and_clear();
+        wait();
+        assert_eq!(told(), lines);
     }
 
     #[test]

@@ -78,7 +78,12 @@ fn describe(
     if empty > 0 {
         writeln!(
             text,
-            "\n{empty} shards have nothing to do: what is timed in the same rounds stays together."
+            "\n{} no work: what is timed in the same rounds stays together.",
+            if empty == 1 {
+                "1 shard has".to_owned()
+            } else {
+                format!("{empty} shards have")
+            }
         )?;
     }
     Ok(())

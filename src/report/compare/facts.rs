@@ -57,7 +57,7 @@ fn of_cell(time: &Measured<TimeRecord>) -> Vec<Taken> {
     let mut all = vec![of_failure((&time.key, &time.failure))];
     if !time.image_hash.is_empty() {
         let mut image = fact(&time.key, IMAGE, "image", &time.image_hash, false);
-        image.work = format!("{:?} at {} spp", time.resolution, time.spp);
+        image.work = format!("{} at {} spp", pixels(time.resolution), time.spp);
         all.push(image);
     }
     all
@@ -69,11 +69,17 @@ pub(super) const BIAS: &str = "bias/v1";
 /// Id of the fact of an image: a hash, which may change intentionally.
 pub(super) const IMAGE: &str = "image/v1";
 
+/// The size of an image, in words.
+pub(super) fn pixels([width, height]: [u32; 2]) -> String {
+    format!("{width} × {height} pixels")
+}
+
 fn of_images(sampler: &MeasuredSampler) -> Vec<Taken> {
     let mut replicates = sampler.replicates.clone();
     replicates.sort_by_key(|r| r.seed);
     let hashes: Vec<&str> = replicates.iter().map(|r| r.image_hash.as_str()).collect();
-    let seeds: Vec<u32> = replicates.iter().map(|r| r.seed).collect();
+    let drawn = replicates.iter().filter(|r| r.randomised);
+    let seeds: Vec<String> = drawn.map(|r| r.seed.to_string()).collect();
     let bad: usize = replicates.iter().map(|r| r.non_finite_pixels).sum();
     let mut images = fact(
         &sampler.key,
@@ -82,10 +88,13 @@ fn of_images(sampler: &MeasuredSampler) -> Vec<Taken> {
         &hashes.join(" "),
         false,
     );
-    images.work = format!(
-        "{:?}, seeds {seeds:?}",
-        replicates.first().map(|r| r.resolution)
-    );
+    let pixels = replicates
+        .first()
+        .map_or(String::new(), |r| pixels(r.resolution));
+    images.work = match &seeds[..] {
+        [] => pixels,
+        seeds => format!("{pixels}, seeds {}", seeds.join(", ")),
+    };
     let text = if bad == 0 {
         "PASS".into()
     } else {

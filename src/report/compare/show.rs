@@ -197,7 +197,10 @@ fn changes(comparison: &Comparison) -> (Table, Vec<&str>, Vec<String>) {
             ]);
         }
         let lines = left_out.into_iter();
-        more.extend(lines.map(|(why, n)| format!("{n} more {}: {why}", verdict.word())));
+        more.extend(lines.map(|(why, n)| match &*why {
+            "" => format!("{n} more {}", verdict.word()),
+            why => format!("{n} more {}: {why}", verdict.word()),
+        }));
     }
     (table, reasons, more)
 }

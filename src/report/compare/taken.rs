@@ -1,7 +1,7 @@
 //! The figures of a side with their evidence: raw samples where the records have them.
 
 use super::Identity;
-use super::facts::{BIAS, IMAGE, fact, facts};
+use super::facts::{BIAS, IMAGE, fact, facts, pixels};
 use super::side::Side;
 use crate::data::{RunData, View};
 use crate::failed_checks;
@@ -380,13 +380,16 @@ fn of_sampler(view: &View, sampler: &MeasuredSampler) -> Seeds {
             r.spp, r.mean, r.mse, r.file
         ),
     };
-    let work = sampler.replicates.first().map_or(String::new(), |r| {
-        format!("{} × {} pixels", r.resolution[0], r.resolution[1])
-    });
+    let work = sampler
+        .replicates
+        .first()
+        .map_or(String::new(), |r| pixels(r.resolution));
     let seeds = |values: Vec<f64>| -> Option<Evidence> {
         let whole =
             values.len() == sampler.replicates.len() && values.iter().all(|x| x.is_finite());
-        let seeds = sampler.replicates.iter().map(|r| r.seed);
+        // Where no seed changes the image, it is the same image with another.
+        let seed = |r: &&ErrorRecord| if r.randomised { r.seed } else { 0 };
+        let seeds = sampler.replicates.iter().map(seed);
         let mut values: Vec<(u32, f64)> = seeds.zip(values).collect();
         values.sort_by_key(|(seed, _)| *seed);
         whole.then(|| Evidence::Seeds {

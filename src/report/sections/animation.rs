@@ -98,7 +98,8 @@ fn time_ratio(rays: &FrameRays, software: bool) -> Option<Interval> {
 }
 
 /// Returns the number of million rays of the class in the frame from which a rebuild pays: its additional cost over the
-/// saving per ray. A word if it costs no more, or if the interval of the saving is not above 0.
+/// saving per ray. A word if it costs no more (`few`: and its rays are slower, so that many rays pay for the refit), or if
+/// the interval of the saving is not above 0.
 fn break_even(frame: &FrameRecord, rays: &FrameRays, software: bool) -> Option<Estimate> {
     let of = |ms: &[f64]| median_interval(ms).map(|i| i.value);
     let more = of(frame.rebuild.ms(software))? - of(frame.refit.ms(software))?;
@@ -106,7 +107,8 @@ fn break_even(frame: &FrameRecord, rays: &FrameRays, software: bool) -> Option<E
     let differences: Vec<f64> = refitted.iter().zip(rebuilt).map(|(a, b)| a - b).collect();
     let saved = median_interval(&differences)?;
     if more <= 0.0 {
-        return Some(Estimate::Word("any"));
+        let is_slower = saved.high < 0.0;
+        return Some(Estimate::Word(if is_slower { "few" } else { "any" }));
     }
     if saved.high <= 0.0 {
         return Some(Estimate::Word("none"));
@@ -163,4 +165,31 @@ pub fn values(data: &RunData, scene: &SceneGroup) -> Vec<Value<'static>> {
         }
     }
     values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn building_anew_pays_from_so_many_rays_or_for_few_or_never() {
+        let cost = |ms: f64| json!({ "processor_ms": [], "wall_ms": vec![ms; 7], "passes_ms": [] });
+        let told = |[refit, rebuild]: [f64; 2], [refitted, rebuilt]: [f64; 2]| {
+            let frame = json!({
+                "frame": 1, "judged": 1, "refit": cost(refit), "rebuild": cost(rebuild), "sah": [null, null],
+                "classes": [{
+                    "class": "bounce", "rays": 2_000_000, "counters": [null, null], "cost": [cost(refitted), cost(rebuilt)],
+                }],
+            });
+            let frame: FrameRecord = serde_json::from_value(frame).unwrap();
+            break_even(&frame, &frame.classes[0], false).unwrap()
+        };
+        // Ten more, and one less for two million rays.
+        assert_eq!(told([1.0, 11.0], [3.0, 2.0]), Estimate::from(20.0));
+        assert_eq!(told([1.0, 11.0], [2.0, 3.0]), Estimate::Word("none"));
+        assert_eq!(told([11.0, 1.0], [3.0, 2.0]), Estimate::Word("any"));
+        // Rays of the refitted tree are faster: beyond so many of them it costs less.
+        assert_eq!(told([11.0, 1.0], [2.0, 3.0]), Estimate::Word("few"));
+    }
 }

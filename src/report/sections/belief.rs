@@ -188,15 +188,18 @@ fn paths(data: &RunData) -> Option<Check> {
         count(sum(|p| p.ill_conditioned) as u64),
         count(sum(|p| p.flips) as u64),
     );
+    let mut further = Vec::new();
     for one in &data.paths {
         let [scene, integrator] = [axis::SCENE, axis::INTEGRATOR].map(|axis| one.key.label(axis));
         if let Some(reason) = &one.not_judged {
-            detail += &format!("; {integrator} on {scene} is NOT JUDGED: {reason}");
+            further.push(format!("; {integrator} on {scene} is NOT JUDGED: {reason}"));
         }
         if let Some(fault) = &one.fault {
-            detail += &format!("; {integrator} on {scene} FAILED: {fault}");
+            further.push(format!("; {integrator} on {scene} FAILED: {fault}"));
         }
     }
+    // Kernels, tests and organisations are checked each by itself.
+    detail += &without_repeats(further).concat();
     let failed = data.paths.iter().any(|p| p.fault.is_some());
     (!data.paths.is_empty()).then(|| Check {
         verdict: Verdict::new(judged > 0, failed),

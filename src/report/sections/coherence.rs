@@ -51,7 +51,7 @@ fn machine(record: &CoherenceRecord) -> String {
     };
     let size = |kib: u32| format::bytes(1024 * u64::from(kib));
     format!(
-        "Coherence, by a model on the host: warps of {} × {} pixels of an image of {} × {}, {} of each of {} groups, {} of each pixel; an L1 of {} ({}) \
+        "Coherence, by a model on the host: warps of {} × {} pixels of an image of {} × {}, {} of each of {}, {} of each pixel; an L1 of {} ({}) \
          for each group and an L2 of {} ({}) for all, both empty at first, with lines of {} bytes, of which those go that were used \
          longest ago. An issue is a visit of a node or a test of a triangle that lanes of a warp do together; cycles are those of one \
          multiprocessor if nothing but throughput counted. Single kernel: lanes keep their pixels and wait once the path has ended; \
@@ -62,7 +62,7 @@ fn machine(record: &CoherenceRecord) -> String {
         s.resolution[0],
         s.resolution[1],
         format::plural(s.warps as usize, "warp"),
-        s.groups,
+        format::plural(s.groups as usize, "group"),
         format::plural(s.samples as usize, "sample"),
         size(s.l1_kib),
         ways(s.l1_ways),

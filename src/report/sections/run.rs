@@ -4,7 +4,7 @@ use crate::data::{Measured, RunData, SceneGroup, View};
 use crate::document::*;
 use crate::format::{self, count, percent};
 use crate::samplers::MeasuredSampler;
-use raystone_record::{FinishedRecord, Key, StructureRecord, TimeRecord};
+use raystone_record::{FinishedRecord, Key, RunRecord, StructureRecord, TimeRecord};
 
 /// Largest fraction of the wall time for the harness itself.
 const OVERHEAD_TARGET: f64 = 0.1;
@@ -17,11 +17,13 @@ pub fn sections(data: &RunData) -> Vec<Section> {
 
 fn time(data: &RunData) -> Option<Section> {
     let mut section = Section::new("time", "What the run cost");
-    if let Some(run) = data.run.filter(|run| run.renders_full_product > 0) {
+    // Excludes may leave a sampler fewer full cells than it has renders: then nothing is saved.
+    let saves = |run: &&RunRecord| run.renders_full_product > run.renders_planned;
+    if let Some(run) = data.run.filter(saves) {
         let saved = 1.0 - run.renders_planned as f64 / run.renders_full_product as f64;
         section.blocks.push(Block::Paragraph(format!(
-            "The full product of all axes needs {} renders; the plan took {} ({} saved), because images are equal \
-             across structures.",
+            "To measure the error of every full cell would need {} renders; the plan took {} ({} saved), because images \
+             are equal across structures.",
             count(run.renders_full_product as u64),
             count(run.renders_planned as u64),
             percent(saved)

@@ -63,7 +63,7 @@ pub(crate) const WORK: TableSpec = TableSpec {
 };
 pub(crate) const RECORDED_RAYS: TableSpec = TableSpec {
     caption: "Coherence of the recorded rays, by a model on the host: warps of {} rays that follow each other, {} in each of \
-              {} groups",
+              {}",
     rows: &[Axis("class", axis::RAYS), Structure], across: BY_FIGURE,
     figures: &[&SIMT_EFFICIENCY, &LINES_PER_ISSUE, &L1_HITS, &ISSUES_PER_RAY, &L2_BYTES_PER_RAY, &CYCLES_PER_RAY],
 };
@@ -78,7 +78,8 @@ pub(crate) const TREES: TableSpec = TableSpec {
 pub(crate) const FRAME_RAYS: TableSpec = TableSpec {
     caption: "Rays frame by frame: nodes visited and time in the refitted tree over those in the tree built anew, and from how \
               many million rays of a class on building anew pays in that frame (none: its rays are slower; unresolved: the \
-              interval of the difference holds 0; any: it costs no more)",
+              interval of the difference holds 0; any: it costs no more; few: \
+              it costs no more, but its rays are slower)",
     rows: &[Structure, Axis(":at", axis::SUBJECT)], across: BY_RAYS,
     figures: &[&FRAME_NODES_RATIO, &FRAME_TIME_RATIO, &FRAME_BREAK_EVEN],
 };

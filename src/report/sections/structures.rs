@@ -237,7 +237,11 @@ fn coherence_table(names: &Names, scene: &SceneGroup, values: &[Value]) -> Table
         return Table::default();
     };
     let s = &modelled.settings;
-    let words = [s.warp[0] * s.warp[1], s.warps, s.groups].map(|n| n.to_string());
+    let words = [
+        (s.warp[0] * s.warp[1]).to_string(),
+        s.warps.to_string(),
+        format::plural(s.groups as usize, "group"),
+    ];
     RECORDED_RAYS.table(names, values, &words.each_ref().map(String::as_str))
 }
 

@@ -48,8 +48,8 @@ pub fn section(dir: &Path, data: &RunData) -> Section {
     }
     let mut pairs = point_sets(data);
     let further = pairs.split_off(pairs.len().min(OPEN_PAIRS));
-    blocks.extend(answers("Verdict on point sets", &pairs));
-    let further = answers("Further pairs of dimensions", &further);
+    blocks.extend(answers("point sets", &pairs));
+    let further = answers("further pairs of dimensions", &further);
     blocks.extend(Block::fold(
         "Verdict on further pairs of dimensions",
         further,
@@ -244,7 +244,7 @@ fn failed(data: &RunData) -> Option<Block> {
 /// Returns everything on one scene.
 fn of_scene(scene: &SceneGroup) -> Vec<Block> {
     let rulings = rulings(scene);
-    let mut blocks = answers(&format!("Verdict on {}", scene.name), &rulings);
+    let mut blocks = answers(scene.name, &rulings);
     if blocks.is_empty() {
         let none = format!("On {} nothing could be compared.", scene.name);
         blocks.push(Block::Paragraph(none));
@@ -264,13 +264,13 @@ fn of_scene(scene: &SceneGroup) -> Vec<Block> {
 }
 
 /// Returns the answers as a table, and a line for each contender without competition.
-fn answers(caption: &str, rulings: &[(String, Ruling)]) -> Vec<Block> {
+fn answers(of: &str, rulings: &[(String, Ruling)]) -> Vec<Block> {
     let alone = rulings.iter().filter(|(_, ruling)| !ruling.is_contest());
     let alone = by_answer(alone.cloned().collect());
-    let mut blocks = Vec::from_iter(table_of(caption, rulings).into_block());
-    let place = caption.replacen("Verdict on", " on", 1);
+    let caption = format!("Verdict on {of}");
+    let mut blocks = Vec::from_iter(table_of(&caption, rulings).into_block());
     let place = if blocks.is_empty() {
-        place
+        format!(" on {of}")
     } else {
         String::new()
     };
@@ -528,5 +528,34 @@ pub(super) fn rank(view: &View, contenders: Vec<Contender>) -> Ruling {
     match trust::doubt_of_errors(view) {
         Some(reason) => Ruling::Withheld(reason),
         None => judge(contenders, view.figure(Metric::RelMse).better),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raystone_record::Interval;
+
+    #[test]
+    fn a_question_with_one_contender_says_what_it_is_about() {
+        let alone = Contender {
+            name: "sobol × none".into(),
+            figure: Interval::exact(0.01),
+            log: None,
+        };
+        let asked = [(
+            "lowest D*: pixel x".to_owned(),
+            judge(vec![alone], Better::Lower),
+        )];
+        for of in ["point sets", "further pairs of dimensions"] {
+            let blocks = answers(of, &asked);
+            let [Block::Paragraph(text)] = &blocks[..] else {
+                panic!("no single paragraph");
+            };
+            assert_eq!(
+                *text,
+                format!("Without competition on {of}: sobol × none (alone) in lowest D*: pixel x.")
+            );
+        }
     }
 }

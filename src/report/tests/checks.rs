@@ -1,6 +1,7 @@
 //! Every check of a run can fail.
 
 use super::*;
+use crate::document::Block;
 
 /// Returns a run without any fault.
 fn clean_run() -> Vec<Line> {
@@ -19,6 +20,62 @@ fn failing(lines: &[Line]) -> Vec<(String, Verdict)> {
         .into_iter()
         .filter(|check| check.verdict != Verdict::Pass);
     failing.map(|check| (check.title, check.verdict)).collect()
+}
+
+#[test]
+fn what_is_not_judged_of_several_cells_is_told_once() {
+    let mut lines = clean_run();
+    let is_paths = |line: &&Line| matches!(line.body, Body::Paths(_));
+    let mut other = lines.iter().find(is_paths).unwrap().clone();
+    other.body = Body::Paths(PathsRecord::not_judged("integrator `mine`"));
+    for kernels in ["a", "b"] {
+        let key = other.key.clone().with(axis::KERNELS, kernels);
+        lines.push(Line {
+            key,
+            ..other.clone()
+        });
+    }
+    let checks = sections::belief::checks(&RunData::new(&lines));
+    let paths = checks.iter().find(|c| c.title.contains("path by path"));
+    let told = paths.unwrap().detail.matches("NOT JUDGED").count();
+    assert_eq!(told, 1, "{}", paths.unwrap().detail);
+}
+
+#[test]
+fn a_noisy_reference_is_above_its_limit_in_the_digits_that_are_shown() {
+    let lines = changed(|_, body| {
+        if let Body::Error(error) = body {
+            for at in &mut error.errors {
+                at.metrics.insert("relmse-unbiased/eps=1e-2/v1".into(), 1.0);
+                at.without_part.clear();
+            }
+        } else if let Body::Reference(reference) = body {
+            reference.relmse = Some(0.010_04);
+        }
+    });
+    let checks = sections::belief::checks(&RunData::new(&lines));
+    let noise = checks.iter().find(|c| c.title.contains("Reference noise"));
+    let detail = &noise.unwrap().detail;
+    assert!(
+        detail.contains("has 1.00 % of the least relMSE, more than 1 %"),
+        "{detail}"
+    );
+}
+
+#[test]
+fn a_plan_that_saves_no_renders_does_not_say_so() {
+    let says = |planned: usize| {
+        let lines = changed(|_, body| {
+            if let Body::Run(run) = body {
+                run.renders_planned = planned;
+            }
+        });
+        let sections = sections::run::sections(&RunData::new(&lines));
+        let mut blocks = sections.iter().flat_map(|section| &section.blocks);
+        blocks.any(|block| matches!(block, Block::Paragraph(text) if text.contains("saved")))
+    };
+    // Of 560 renders for every full cell.
+    assert_eq!([152, 560, 600].map(says), [true, false, false]);
 }
 
 #[test]

@@ -4,8 +4,9 @@ use super::compared;
 use super::records::Made;
 use raystone::compare::judge::ChangeVerdict;
 use raystone::compare::side::Side;
-use raystone::compare::{Confirmed, Options, compare_sides};
+use raystone::compare::{Confirmed, Options, compare_sides, show};
 use raystone::measure::record::{Body, Line, RunRecord};
+use raystone::report::terminal::Screen;
 use std::path::Path;
 use std::process::Command;
 
@@ -60,6 +61,48 @@ fn the_seed_of_a_run_is_that_of_its_experiment_with_what_was_laid_over() {
 }
 
 #[test]
+fn what_no_seed_changes_is_the_same_with_another() {
+    let one_image = |seed: u32| {
+        let mut lines = Made::default().lines();
+        lines.retain(|line| !matches!(&line.body, Body::Error(record) if record.replicate > 0));
+        for line in &mut lines {
+            if let Body::Error(record) = &mut line.body {
+                (record.randomised, record.seed) = (false, seed);
+            }
+        }
+        of_text(&format!("[run]\nseed = {seed}\n"), lines)
+    };
+    let found = compared(&one_image(1), &one_image(2));
+    for figure in ["relmse-unbiased/v1", "rmse-unbiased/v1", "image/v1"] {
+        let of_it = found.findings.iter().filter(|f| f.figure.id == figure);
+        let verdicts: Vec<ChangeVerdict> = of_it.map(|f| f.verdict).collect();
+        assert!(!verdicts.is_empty(), "{figure}");
+        assert!(
+            verdicts.iter().all(|v| *v == ChangeVerdict::Same),
+            "{figure}: {verdicts:?}"
+        );
+    }
+}
+
+#[test]
+fn what_is_not_listed_is_counted_with_its_reason_if_it_has_one() {
+    let mut lines = Made::default().lines();
+    let all = of_text("", lines.clone());
+    lines.retain(|line| !matches!(&line.body, Body::Error(_)));
+    let found = compared(&of_text("", lines), &all);
+    let text = show::terminal(&found, Screen::default());
+    let more: Vec<&str> = text
+        .lines()
+        .filter(|line| line.contains(" more new"))
+        .collect();
+    assert!(!more.is_empty(), "{text}");
+    assert!(
+        more.iter().all(|line| line.ends_with(" more new")),
+        "{more:?}"
+    );
+}
+
+#[test]
 fn another_seed_is_undecided_and_the_same_seed_is_worse() {
     let base = || of_text("[run]\nseed = 1\n", Made::default().lines());
     let others = || of_other_rays(Made::default().lines());
@@ -78,6 +121,14 @@ fn another_seed_is_undecided_and_the_same_seed_is_worse() {
             .iter()
             .any(|note| note.contains("run.seed 1 and 2"))
     );
+    // In words, not as a program writes values.
+    assert!(
+        found
+            .findings
+            .iter()
+            .any(|f| f.why.contains("pixels, seeds "))
+    );
+    assert!(found.findings.iter().all(|f| !f.why.contains("Some")));
     // Seed-independent values are compared bit by bit.
     let mut slower = others();
     for line in &mut slower {

@@ -131,7 +131,7 @@ fn a_plan_leaves_out_pairs_that_make_no_sense_and_says_why() {
     assert_eq!(plan.skipped.len(), 3);
     let text = plan.describe();
     assert!(
-        text.contains("left out: pixel-hash × cranley-patterson (1 cells): "),
+        text.contains("left out: pixel-hash × cranley-patterson (1 cell): "),
         "{text}"
     );
     assert!(text.contains("halton is not digital in base 2"), "{text}");
