@@ -2,6 +2,7 @@
 
 use super::Image;
 use super::read::checked_size;
+use exr::error::Error;
 use exr::image::{AnyChannels, FlatSamples, Layer};
 use exr::meta::MetaData;
 use exr::prelude::{ReadChannels, ReadLayers, read};
@@ -14,7 +15,7 @@ const PICTURE_LAYERS: [&str; 6] = ["", "rgba", "rgb", "color", "combined", "beau
 pub(super) fn read_exr(bytes: &[u8]) -> Result<Image, String> {
     // Check sizes first: the crate allocates all pixels that a header claims.
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false);
-    for header in &meta.map_err(|e| e.to_string())?.headers {
+    for header in &meta.map_err(said)?.headers {
         checked_size(header.layer_size.x() as u64, header.layer_size.y() as u64)?;
     }
     let found = read()
@@ -24,7 +25,7 @@ pub(super) fn read_exr(bytes: &[u8]) -> Result<Image, String> {
         .all_layers()
         .all_attributes()
         .from_buffered(Cursor::new(bytes))
-        .map_err(|e| e.to_string())?;
+        .map_err(said)?;
     let layers = &found.layer_data;
     let candidates: Vec<Colours> = layers
         .iter()
@@ -51,6 +52,16 @@ pub(super) fn read_exr(bytes: &[u8]) -> Result<Image, String> {
         }
     }
     Image::new(width, height, pixels).map_err(|e| e.to_string())
+}
+
+/// What is wrong with a file, and what to do about one that is right and not read.
+fn said(error: Error) -> String {
+    match error {
+        Error::NotSupported(_) => {
+            format!("{error}; save it flat, with whole channels R, G and B, by ZIP or uncompressed")
+        }
+        error => error.to_string(),
+    }
 }
 
 type FlatLayer = Layer<AnyChannels<FlatSamples>>;
@@ -279,6 +290,21 @@ mod tests {
         assert_eq!((image.width, image.height), (2, 2));
         let lit: Vec<bool> = image.pixels.iter().map(|p| p[0] > 0.0).collect();
         assert_eq!(lit, [false, false, false, true]);
+    }
+
+    #[test]
+    fn what_is_right_and_not_read_is_named_with_what_to_do() {
+        let mut bytes = file(
+            vec![part(None, &RGB)],
+            IntegerBounds::from_dimensions((2, 1)),
+        );
+        let name = b"chlist\0";
+        let start = bytes.windows(name.len()).position(|w| w == name).unwrap() + name.len();
+        // Columns of B for one sample: behind the size of the list, its name, its type and four flags.
+        bytes[start + 4 + b"B\0".len() + 8] = 2;
+        let message = read_exr(&bytes).unwrap_err();
+        assert!(message.contains("subsampling"), "{message}");
+        assert!(message.contains("; save it flat"), "{message}");
     }
 
     #[test]

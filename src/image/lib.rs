@@ -6,6 +6,7 @@ mod exr_file;
 #[cfg(feature = "exr")]
 mod exr_read;
 mod formats;
+mod hdr_lines;
 mod hdr_read;
 mod picture;
 mod primaries;
@@ -15,6 +16,7 @@ mod upright;
 pub use color::*;
 pub use exr_file::Attribute;
 pub use formats::*;
+pub use hdr_read::{hdr_size, read_hdr};
 pub use picture::*;
 pub use primaries::{is_cube_map, other_primaries, primaries_note};
 pub use read::{read_linear, read_npy_array};

@@ -44,13 +44,18 @@ pub(super) fn upright(bytes: &[u8]) -> Option<(Vec<u8>, Turn)> {
 }
 
 impl Turn {
+    /// Width and height of the picture, of those of the file as one of rows.
+    pub(super) fn size(&self, [width, height]: [u32; 2]) -> [u32; 2] {
+        if self.is_column {
+            [height, width]
+        } else {
+            [width, height]
+        }
+    }
+
     pub(super) fn undone(&self, image: &Image) -> Result<Image, String> {
         let [lines, within] = [image.height, image.width];
-        let [width, height] = if self.is_column {
-            [lines, within]
-        } else {
-            [within, lines]
-        };
+        let [width, height] = self.size([within, lines]);
         let turned =
             |k: u32, count: u32, is_turned: bool| if is_turned { count - 1 - k } else { k };
         let place = |y: u32, x: u32| {
@@ -92,6 +97,8 @@ mod tests {
             std::fs::write(&path, file).unwrap();
             let image = read_linear(&path).unwrap();
             assert_eq!([image.width, image.height], [3, 2], "{line}");
+            let file = std::fs::read(&path).unwrap();
+            assert_eq!(crate::hdr_size(&file), Ok([3, 2]), "{line}");
             let found: Vec<f32> = image.pixels.iter().map(|pixel| pixel[0]).collect();
             let expected = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
             assert_eq!(found, expected, "{line}");

@@ -196,9 +196,9 @@ impl Copies {
 /// Says where something is, for a message.
 pub(super) type Place<'a> = &'a dyn Fn() -> String;
 
-/// A step of the walk: into a node under a transform, shown or not, or out of it.
+/// A step of the walk: into a node under a transform and a rotation, shown or not, or out of it.
 enum Step {
-    Into(usize, Mat4, bool),
+    Into(usize, (Mat4, Quat), bool),
     Out(usize),
 }
 
@@ -212,14 +212,14 @@ impl<'a> Geometry<'a> {
             let what = "there are meshes, but no node shows one";
             self.notes.tell(what, || mesh.place("mesh", 0));
         }
-        let into = |node: &usize| Step::Into(*node, Mat4::IDENTITY, true);
+        let into = |node: &usize| Step::Into(*node, (Mat4::IDENTITY, Quat::IDENTITY), true);
         let mut stack: Vec<Step> = roots.iter().rev().map(into).collect();
         // An explicit stack, so that no depth overflows.
         let mut seen = vec![false; nodes.len()];
         let mut is_open = vec![false; nodes.len()];
         let mut walked = 0;
         while let Some(step) = stack.pop() {
-            let (index, parent, shown) = match step {
+            let (index, (parent, turned), shown) = match step {
                 Step::Into(index, parent, shown) => (index, parent, shown),
                 Step::Out(index) => {
                     is_open[index] = false;
@@ -251,7 +251,8 @@ impl<'a> Geometry<'a> {
             self.notes.see_transform(node, own, place);
             let world = parent * own;
             let shown = shown && gltf_instancing::is_visible(node);
-            self.read_camera_of(node, world);
+            let turned = turned * rotation(node);
+            self.read_camera_of(node, (world, turned));
             if shown {
                 self.read_node(node, &place, world)?;
             }
@@ -259,7 +260,7 @@ impl<'a> Geometry<'a> {
             stack.push(Step::Out(index));
             let first_child = stack.len();
             let children = node.list("children").filter_map(Item::as_index);
-            stack.extend(children.map(|child| Step::Into(child, world, shown)));
+            stack.extend(children.map(|child| Step::Into(child, (world, turned), shown)));
             stack[first_child..].reverse();
         }
         Ok(())
@@ -270,13 +271,13 @@ impl<'a> Geometry<'a> {
     }
 
     /// Reads the node's camera; hidden nodes count too.
-    fn read_camera_of(&mut self, node: Item<'a>, world: Mat4) {
+    fn read_camera_of(&mut self, node: Item<'a>, place: (Mat4, Quat)) {
         let Some(index) = node.index("camera") else {
             return;
         };
         let camera = self.document.at("cameras", index);
         if self.camera.is_none() {
-            self.camera = self.read_camera(camera, index, world);
+            self.camera = self.read_camera(camera, index, place);
         } else {
             let what = "cameras behind the first are ignored";
             let place = || camera.map_or(format!("camera {index}"), |c| c.place("camera", index));
@@ -433,7 +434,7 @@ impl<'a> Geometry<'a> {
         &mut self,
         camera: Option<Item<'_>>,
         index: usize,
-        world: Mat4,
+        (world, turned): (Mat4, Quat),
     ) -> Option<Camera> {
         let place = || camera.map_or(format!("camera {index}"), |c| c.place("camera", index));
         let lens = camera.map(|camera| camera.get("perspective"));
@@ -442,14 +443,14 @@ impl<'a> Geometry<'a> {
             self.notes.tell(what, place);
             return None;
         };
-        // glTF cameras look along -z with y up.
+        // glTF cameras look along -z with y up, and no scale turns them around (glTF 2.0, 3.10.2).
         let eye = world.transform_point3(Vec3::ZERO);
-        let forward = world.transform_vector3(Vec3::NEG_Z).normalize_or_zero();
+        let forward = turned * Vec3::NEG_Z;
         let found = Camera {
             eye,
             // Far enough that rounding the target does not turn the view.
             target: eye + forward * eye.length().max(1.0),
-            up: world.transform_vector3(Vec3::Y).normalize_or_zero(),
+            up: turned * Vec3::Y,
             vertical_fov_degrees: fov.to_degrees(),
         };
         if let Err(problem) = crate::check_camera(&found) {
@@ -478,16 +479,28 @@ pub(super) fn transform(node: Item<'_>) -> Mat4 {
         .map_or(Vec3::ONE, |s| s.map(given).into());
     let translation = node.numbers("translation");
     let translation = translation.map_or(Vec3::ZERO, |t| t.map(given).into());
-    let rotation = node.numbers("rotation");
-    let rotation = rotation.map_or(Vec4::W, |q| q.map(given).into());
+    Mat4::from_scale_rotation_translation(scale, rotation(node), translation)
+}
+
+/// A node's own rotation; that of a matrix is what is left of it without its scale, if anything is.
+fn rotation(node: Item<'_>) -> Quat {
+    if node.numbers::<16>("matrix").is_some() {
+        let (_, turned, _) = transform(node).to_scale_rotation_translation();
+        return if turned.is_finite() && turned.length_squared() > 0.0 {
+            turned.normalize()
+        } else {
+            Quat::IDENTITY
+        };
+    }
+    let given = node.numbers("rotation");
+    let rotation = given.map_or(Vec4::W, |q| q.map(|x| x.unwrap_or(f32::NAN)).into());
     // Rounded more than a quaternion of f32 is, or not a rotation at all.
     let is_unit = (rotation.length_squared() - 1.0).abs() < 1e-5;
-    let rotation = match rotation.try_normalize() {
+    Quat::from_vec4(match rotation.try_normalize() {
         Some(unit) if !is_unit => unit,
         None if rotation == Vec4::ZERO => Vec4::W,
         _ => rotation,
-    };
-    Mat4::from_scale_rotation_translation(scale, Quat::from_vec4(rotation), translation)
+    })
 }
 
 /// Why a node cannot be an instance, without the index that only built-in scenes use.

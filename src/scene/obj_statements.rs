@@ -13,6 +13,11 @@ const NONE: u32 = u32::MAX;
 /// Limit on the broken vertices that wait for a face: a file with more is no model.
 const MOST_BROKEN: usize = 4096;
 
+/// Keywords of the statements that are read.
+const KEYWORDS: [&str; 10] = [
+    "v", "vt", "vn", "f", "fo", "o", "g", "usemtl", "mtllib", "s",
+];
+
 /// Marks an index of a texture coordinate or normal that cannot exist.
 const LOST: u32 = NONE - 1;
 
@@ -165,11 +170,12 @@ impl Statements {
                 reader.is_smooth = !matches!(group, "off" | "0");
             }
             // Keywords are in small letters, but for those of a few programs.
-            "V" | "VT" | "VN" | "F" => {
-                let small = keyword.to_ascii_lowercase();
-                self.statement(reader, library, line, &small, rest, words)?;
-            }
-            _ => reader.unread.see(keyword, line),
+            _ => match keyword.to_ascii_lowercase() {
+                small if KEYWORDS.contains(&&*small) => {
+                    self.statement(reader, library, line, &small, rest, words)?;
+                }
+                _ => reader.unread.see(keyword, line),
+            },
         }
         Ok(())
     }
@@ -351,10 +357,12 @@ impl Reader {
         self.numbers.extend(materials);
     }
 
-    /// The material of this name; a comment may follow.
+    /// The material of this name; a comment may follow, and quotation marks may be around it, in the library as well.
     fn material(&self, name: &str) -> Option<u32> {
         let known = |name: &str| self.numbers.get(name).copied();
-        known(name).or_else(|| known(without_comment(name).trim()))
+        let bare = without_comment(name).trim();
+        let quoted = || known(bare.trim_matches('"')).or_else(|| known(&format!("\"{bare}\"")));
+        known(name).or_else(|| known(bare)).or_else(quoted)
     }
 }
 

@@ -5,7 +5,7 @@ use super::image_alpha;
 use super::reduce::{Texels, encode, reduced};
 use super::{LoadReport, Material, Texture, TextureUse};
 use image::error::UnsupportedErrorKind;
-use image::{DynamicImage, ImageError, ImageFormat, ImageReader, Pixel, RgbaImage};
+use image::{DynamicImage, ImageError, ImageFormat, ImageReader, Pixel, Rgb32FImage, RgbaImage};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -185,7 +185,9 @@ fn reader<'a>(name: &str, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8]
     let is_tga = Path::new(name)
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("tga"));
-    if reader.format().is_none() && is_tga {
+    if bytes.starts_with(b"#?") {
+        reader.set_format(ImageFormat::Hdr);
+    } else if reader.format().is_none() && is_tga {
         reader.set_format(ImageFormat::Tga);
     }
     Ok(reader)
@@ -199,7 +201,11 @@ fn checked_size(name: &str, bytes: &[u8]) -> Result<Size, String> {
     if let Some(Disguise { problem, advice }) = Disguise::of(bytes) {
         return Err(format!("{problem} ({advice})"));
     }
-    let (width, height) = reader(name, bytes)?.into_dimensions().map_err(said)?;
+    let reader = reader(name, bytes)?;
+    let (width, height) = match reader.format() {
+        Some(ImageFormat::Hdr) => raystone_image::hdr_size(bytes)?.into(),
+        _ => reader.into_dimensions().map_err(said)?,
+    };
     let needed = 4 * u64::from(width) * u64::from(height);
     let most = FREE_TEXEL_BYTES.max(MOST_TEXEL_BYTES * bytes.len() as u64);
     if needed > most {
@@ -250,6 +256,14 @@ fn eight_bits(image: DynamicImage, kind: Texels) -> (RgbaImage, usize) {
     (DynamicImage::from(light).into_rgba8(), bright)
 }
 
+/// The light of a Radiance file, whose exposure and order of pixels the `image` crate passes over.
+fn light(bytes: &[u8]) -> Result<DynamicImage, String> {
+    let image = raystone_image::read_hdr(bytes)?;
+    let values = image.pixels.into_flattened();
+    let image = Rgb32FImage::from_vec(image.width, image.height, values);
+    Ok(image.unwrap_or_default().into())
+}
+
 /// The texture, and what of it is not as in the file.
 fn decode(
     source: &ImageSource<'_>,
@@ -259,7 +273,10 @@ fn decode(
 ) -> Result<(Texture, Vec<String>), String> {
     let reader = reader(&source.name, bytes)?;
     let format = reader.format();
-    let image = reader.decode().map_err(said)?;
+    let image = match format {
+        Some(ImageFormat::Hdr) => light(bytes)?,
+        _ => reader.decode().map_err(said)?,
+    };
     let (mut image, bright) = eight_bits(image, kind);
     image_alpha::mend(bytes, format, &mut image);
     let size = image.dimensions();

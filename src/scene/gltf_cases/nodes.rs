@@ -427,3 +427,56 @@ fn meshes_that_no_node_shows_are_named() {
         .load()
         .fails(&["no triangles", "no node shows one (mesh 0 `square`)"]);
 }
+
+/// The view matrix has the scaling ignored (glTF 2.0, 3.10.2).
+#[test]
+fn no_scale_turns_a_camera_around() {
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    for (above, own) in [
+        (json!({}), json!({"scale": [1, 1, -1]})),
+        (json!({}), json!({"scale": [-1, -1, -1]})),
+        (json!({}), json!({"scale": [0, 0, 0]})),
+        (json!({"scale": [1, -1, -1]}), json!({})),
+        (
+            json!({}),
+            json!({"matrix": [-2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 3, 0, 0, 0, 0, 1]}),
+        ),
+        // About z, and stretched along y after that.
+        (
+            json!({"scale": [1, 9, 1]}),
+            json!({"rotation": [0, 0, half, half]}),
+        ),
+        (
+            json!({"matrix": [0, 2, 0, 0, -2, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1]}),
+            json!({}),
+        ),
+    ] {
+        let is_turned = [&above, &own]
+            .iter()
+            .any(|node| !node["rotation"].is_null() || node["matrix"][0] == 0);
+        let mut camera = own.clone();
+        camera["camera"] = json!(0);
+        let mut top = above.clone();
+        top["children"] = json!([2]);
+        top["translation"] = json!([0, 0, 5]);
+        if !top["matrix"].is_null() {
+            top["matrix"][14] = json!(5);
+        }
+        let found = case("a scaled camera")
+            .set("/cameras", json!([{"perspective": {"yfov": 0.5}}]))
+            .set("/nodes/-", top)
+            .set("/nodes/-", camera)
+            .set("/scenes/0/nodes", json!([0, 1]))
+            .load();
+        let camera = found.scene().camera.expect("a camera");
+        let forward = (camera.target - camera.eye).normalize();
+        let up = if is_turned { Vec3::NEG_X } else { Vec3::Y };
+        assert_eq!(camera.eye, Vec3::new(0.0, 0.0, 5.0), "{above} {own}");
+        assert!(forward.distance(Vec3::NEG_Z) < 1e-6, "{above} {own}");
+        assert!(
+            camera.up.distance(up) < 1e-6,
+            "{above} {own}: {}",
+            camera.up
+        );
+    }
+}

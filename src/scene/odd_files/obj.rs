@@ -40,6 +40,14 @@ const OBJ: &[(&str, Outcome)] = &[
         "V 1 1 1\nmtllib m.mtl\nusemtl red\nF -2 -3 -4\n",
         Reads("r", &[]),
     ),
+    (
+        "MTLLIB m.mtl\nG wall\nUseMtl red\nF 1 2 3\nUSEMTL blue\nF 1 3 4\nCALL x\n",
+        Reads("rb", &["`CALL` (line 11)"]),
+    ),
+    (
+        "mtllib m.mtl\nusemtl \"red\" # wall\nf 1 2 3\n",
+        Reads("r", &[]),
+    ),
     ("mtllib \"m.mtl\"\nusemtl red\nf 1 2 3\n", Reads("r", &[])),
     (
         "mtllib C:\\my work\\m.mtl\nusemtl red\nf 1 2 3\n",

@@ -152,6 +152,20 @@ fn linear_light_becomes_srgb_as_other_colours_are() {
         panic!("two texels");
     };
     assert_eq!((grey, red, green, blue), ([188; 3], 137, 255, 0));
+    // Its exposure and the factors of its colours are divided by, and its pixels begin where it says.
+    for (lines, order, expected) in [
+        ("EXPOSURE=2\n", "-Y 1 +X 2", [[137; 3], [99; 3]]),
+        (
+            "COLORCORR=2 1 1\n",
+            "-Y 1 +X 2",
+            [[137, 188, 188], [99, 137, 137]],
+        ),
+        ("", "-Y 1 -X 2", [[137; 3], [188; 3]]),
+    ] {
+        let head = format!("#?RGBE\n{lines}FORMAT=32-bit_rle_rgbe\n\n{order}\n");
+        let hdr = [head.as_bytes(), &[128; 4], &[128, 128, 128, 127]].concat();
+        assert_eq!(colors("light.hdr", &hdr), expected, "{head}");
+    }
 }
 
 #[test]
