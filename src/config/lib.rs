@@ -32,7 +32,7 @@ pub use cells::{COMPACTIONS, CONES, Cell, MEDIA, NO_PEER, RAYS, SPECULAR, STRESS
 pub use error::{ConfigError, Place};
 pub use experiment::{Axes, CellSet, Condition, Experiment, REFERENCE_PARTS, Seeds};
 pub use pattern::{Pattern, Selector, split_outside_brackets};
-pub use plan::{Plan, Skipped, plural};
+pub use plan::{Plan, Skipped};
 pub use sections::{
     Animation, Coherence, Discrepancy, Follow, Gate, Map, Motion, Pace, Reference, Rule, Run,
     SppCounts, StopRule, Timing, View, Window,

@@ -13,6 +13,7 @@ use super::product::{
     Point, asked_once, check_size, excluded, filter, included, product, refused, shared, unmet,
 };
 use raystone_core::params::Variant;
+use raystone_core::text::plural;
 use std::collections::HashSet;
 use std::fmt::{self, Write as _};
 
@@ -298,9 +299,4 @@ fn no_structure(cell: &Cell) -> Skipped {
         reason: "no structure is left that could trace this scene with these kernels".to_owned(),
         cells: 1,
     }
-}
-
-/// A number with its noun: `1 cell`, `3 cells`.
-pub fn plural(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }

@@ -1,6 +1,7 @@
 //! Numbers as text: three significant digits, units, and a dash for absent ones.
 
 use raystone_core::text::escape::raised;
+pub use raystone_core::text::{count, plural};
 use raystone_record::Environment;
 use raystone_record::Interval;
 use raystone_record::figure::{Figure, Shown};
@@ -90,19 +91,6 @@ fn exponent(value: f64) -> String {
     format!("{value:.2}").replace('-', "−")
 }
 
-/// Formats an integer with thin groups of three: `262,267`.
-pub fn count(value: u64) -> String {
-    let digits = value.to_string();
-    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
 /// Formats bytes with a binary unit.
 pub fn bytes(value: u64) -> String {
     const UNITS: [&str; 4] = ["KiB", "MiB", "GiB", "TiB"];
@@ -147,15 +135,6 @@ pub(crate) fn percent(share: f64) -> String {
         _ => 0,
     };
     format!("{value:.digits$} %").replace('-', "−")
-}
-
-/// Formats `1 sampler`, `3 samplers`.
-pub fn plural(n: usize, noun: &str) -> String {
-    if n == 1 {
-        format!("1 {noun}")
-    } else {
-        format!("{} {noun}s", count(n as u64))
-    }
 }
 
 /// Formats date, adapter and processor in one line.

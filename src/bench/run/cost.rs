@@ -1,7 +1,8 @@
 //! Cost estimate of a plan, used by `--dry-run`, the remaining time, and balanced shards.
 
-use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS, plural};
+use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS};
 use raystone_core::params::Variant;
+use raystone_core::text::plural;
 use raystone_render::IntegratorRegistry;
 use raystone_sampling::dimensions::{FIRST_BOUNCE, PER_BOUNCE};
 use std::collections::BTreeMap;
