@@ -154,3 +154,51 @@ pub fn values(data: &RunData, scene: &SceneGroup) -> Vec<Value<'static>> {
     }
     values
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raystone_record::Cost;
+
+    fn cost(ms: &[f64]) -> Cost {
+        Cost {
+            wall_ms: ms.to_vec(),
+            ..Cost::default()
+        }
+    }
+
+    /// Rounds of a million rays in the refitted tree and in the one that was built anew, which cost 2 ms and 12 ms.
+    fn rays_until([refitted, rebuilt]: [[f64; 7]; 2]) -> Option<Estimate> {
+        let frame = FrameRecord {
+            frame: 0,
+            judged: 1,
+            refit: cost(&[2.0; 7]),
+            refit_on_host: None,
+            rebuild: cost(&[12.0; 7]),
+            sah: [None; 2],
+            classes: Vec::new(),
+        };
+        let rays = FrameRays {
+            class: RayClass::Bounce,
+            rays: 1_000_000,
+            counters: [None; 2],
+            cost: [cost(&refitted), cost(&rebuilt)],
+        };
+        break_even(&frame, &rays, false)
+    }
+
+    #[test]
+    fn a_rebuilt_tree_pays_after_the_rays_that_save_its_build_never_or_nobody_knows() {
+        // 10 ms more, 2 ms less for each million rays: after five million.
+        let Some(Estimate::Known(found)) = rays_until([[6.0; 7], [4.0; 7]]) else {
+            panic!("no number");
+        };
+        assert!((found.value - 5.0).abs() < 1e-9, "{found:?}");
+        let slower = rays_until([[4.0; 7], [6.0; 7]]);
+        assert!(matches!(slower, Some(Estimate::Word("none"))));
+        // Faster in most rounds, but not in all that the interval of the median holds.
+        let noisy = [3.0, 5.0, 3.9, 5.1, 4.6, 3.5, 5.2];
+        let unclear = rays_until([noisy, [4.0; 7]]);
+        assert!(matches!(unclear, Some(Estimate::Word("unresolved"))));
+    }
+}
