@@ -373,6 +373,11 @@ mod tests {
             bound.contains("\"a\"") && bound.contains("`least`"),
             "{bound}"
         );
+        let some = "at = [{ row = \"x\", most = 2.0 }, { row = \"y\" }]\n";
+        let partly = complaint(&format!("{HEAD}{ITEM}{some}"));
+        assert!(partly.contains("needs a bound"), "{partly}");
+        let all = some.replace("\"y\"", "\"y\", least = 1.0");
+        assert!(Thesis::parse(&format!("{HEAD}{ITEM}{all}"), "x").is_ok());
         let twice = complaint(&format!("{HEAD}{ITEM}least = 1.0\n{ITEM}least = 1.0\n"));
         assert!(twice.contains("another one"), "{twice}");
         let ratio = ITEM.replace("bound", "ratio");

@@ -92,4 +92,15 @@ mod tests {
         assert_eq!((scene.daylight, scene.environment), (None, Vec3::ZERO));
         assert_eq!(scene.report.warnings.len(), 0, "{:?}", scene.report);
     }
+
+    #[test]
+    fn lamps_among_mirrored_copies_shine_down_too() {
+        let scene = load_with("instances", &[("hung_lamps", ParamValue::Integer(4))]);
+        let first = scene.triangles.len() - 8;
+        assert!((0..first).any(|id| scene.is_mirrored(id)));
+        for id in first..scene.triangles.len() {
+            let [a, b, c] = scene.outward(id);
+            assert!((b - a).cross(c - a).y < 0.0, "{id}");
+        }
+    }
 }

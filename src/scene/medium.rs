@@ -476,6 +476,21 @@ mod tests {
         assert_eq!(coloured.tints[0].to_array(), [0.5, 1.0, 0.0]);
         let nothing = tinted([0.0; 3], [1.0; 3]).media[0].clone();
         assert!(!nothing.is_coloured() && nothing.volume.scattering == [0.0]);
+        // What only absorbs keeps its colour.
+        let dye = load_with(
+            "cornell-box",
+            &[
+                ("medium", name("constant")),
+                ("scattering", Number(0.0)),
+                ("absorption", Number(4.0)),
+                (
+                    "absorption_tint",
+                    List([0.25, 0.5, 0.0].map(Number).to_vec()),
+                ),
+            ],
+        );
+        assert_eq!(dye.media[0].volume.absorption, [2.0]);
+        assert_eq!(dye.media[0].tints[1].to_array(), [0.5, 1.0, 0.0]);
         let fog = raystone_volume::Volume::constant(1.0, 0.0, 1.0).unwrap();
         for wrong in [[-0.1, 1.0, 1.0], [1.1, 1.0, 1.0], [f32::NAN, 1.0, 1.0]] {
             let tints = [glam::Vec3::ONE, glam::Vec3::from_array(wrong)];

@@ -97,6 +97,8 @@ mod tests {
             (&[0.4545, 0.4545, 0.4545], 0.45, true),
             (&[0.46, 0.46, 0.46], 0.45, false),
             (&[0.3], 0.0, false),
+            // Half of them are longer.
+            (&[0.40, 4.2, 4.5, 0.37], 0.45, false),
         ] {
             assert_eq!(is_hidden(samples, empty), hidden, "{samples:?} {empty}");
         }

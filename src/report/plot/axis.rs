@@ -85,7 +85,11 @@ impl Axis {
             let label = plain(value);
             Tick { value, label }
         };
-        let ticks = (first..=last).step_by(stride).map(tick).collect();
+        let ticks: Vec<Tick> = (first..=last).step_by(stride).map(tick).collect();
+        // Values that are no powers of two lie between two ticks.
+        let within =
+            |(low, high): (f64, f64), tick: &Tick| (low.min(tick.value), high.max(tick.value));
+        let (low, high) = ticks.iter().fold((low, high), within);
         let range = [low / 1.12, high * 1.12];
         Some(Self::logarithmic(range, ticks, title))
     }
@@ -337,6 +341,32 @@ mod tests {
     }
 
     #[test]
+    fn a_tick_stands_at_its_own_value() {
+        for values in [
+            [3.0, 24.0],
+            [6.0, 10.0],
+            [1.0, 32.0],
+            [5.0, 5.0],
+            [0.3, 70_000.0],
+        ] {
+            let [log2, log10] = [
+                Axis::log2(values.into_iter(), ""),
+                Axis::log10(values.into_iter(), ""),
+            ];
+            for axis in [log2.unwrap(), log10.unwrap()] {
+                assert!(!axis.ticks.is_empty());
+                for tick in &axis.ticks {
+                    let at = axis.min * (axis.max / axis.min).powf(axis.share(tick.value));
+                    assert!(
+                        (at / tick.value - 1.0).abs() < 1e-9,
+                        "{values:?}: {tick:?} at {at}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_lone_point_far_away_is_cut_off_and_a_long_range_that_is_filled_is_not() {
         let mut values: Vec<f64> = (1..=10).map(|i| 0.01 * f64::from(i)).collect();
         let ends = |values: &[f64]| without_lone_points(values.iter().copied()).unwrap();
@@ -366,6 +396,7 @@ mod tests {
         assert_eq!(labels(Some(axis)), ["0", "2", "4", "6"]);
         assert_eq!(labels(Some(Axis::whole(3.0, ""))), ["0", "1", "2", "3"]);
         assert_eq!(labels(Some(Axis::whole(20.0, ""))).len(), 11);
+        assert!(labels(Some(Axis::whole(29.0, ""))).len() <= 11);
         let log = Axis::log10([1.0, 100.0].into_iter(), "").unwrap();
         assert!((log.share(10.0) - 0.5).abs() < 1e-12);
     }

@@ -63,5 +63,9 @@ mod tests {
         };
         assert!(is_flat([44, 41, 39, 47, 42, 40, 45, 46, 44, 44]));
         assert!(!is_flat([6, 4, 6, 5, 6, 5, 7, 2, 7, 32]) && is_flat([0; 10]));
+        // χ² is 18.0, 21.6 and 21.8, and 21.67 once in a hundred times.
+        assert!(is_flat([19, 1, 13, 7, 10, 10, 10, 10, 10, 10]));
+        assert!(is_flat([20, 0, 12, 8, 12, 8, 10, 10, 10, 10]));
+        assert!(!is_flat([20, 0, 13, 7, 10, 10, 10, 10, 10, 10]));
     }
 }

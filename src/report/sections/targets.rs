@@ -209,4 +209,35 @@ mod tests {
         assert_eq!(of(1.2, &[]), Some(Verdict::Fail));
         assert_eq!(of(1.2, &["stress.quick=true"]), None);
     }
+
+    #[test]
+    fn the_value_told_of_a_target_is_the_one_closest_to_missing_it() {
+        let told = |bound: &str| {
+            let text = format!(
+                "[[expect]]\nid = \"ratio\"\nsays = \"a ratio\"\nfigure = \"{}\"\ncompare = \"bound\"\n{bound}\n",
+                TRAVERSAL_RATIO.id
+            );
+            let mut lines = vec![run(&[])];
+            if let Body::Run(run) = &mut lines[0].body {
+                run.experiment_text = text;
+            }
+            for (test, ratio) in [("watertight", 3.0), ("pluecker", 1.0), ("bare", 2.0)] {
+                let key = Key::default().with(axis::TRIANGLE, test);
+                let ratio = vec![Reading::exact(&TRAVERSAL_RATIO, ratio)];
+                lines.push(measured(key, ratio, Vec::new()));
+            }
+            let [(_, verdict, detail)] = &verdicts(&lines)[..] else {
+                panic!("one target")
+            };
+            (*verdict, detail[..4].to_owned())
+        };
+        for (bound, verdict, value) in [
+            ("least = 0.5", Verdict::Pass, "1.00"),
+            ("least = 1.5", Verdict::Fail, "1.00"),
+            ("most = 3.5", Verdict::Pass, "3.00"),
+            ("most = 2.5", Verdict::Fail, "3.00"),
+        ] {
+            assert_eq!(told(bound), (verdict, value.to_owned()), "{bound}");
+        }
+    }
 }

@@ -154,5 +154,7 @@ mod tests {
         assert!((found.value - 100.0).abs() < 1e-9, "{found:?}");
         assert_eq!(of(0.5, 1.0), Estimate::Word("never"));
         assert_eq!(of(1.0, 0.98), Estimate::Word("undecided"));
+        // The intervals of both touch, though neither holds the other's value.
+        assert_eq!(of(1.0, 0.93), Estimate::Word("undecided"));
     }
 }

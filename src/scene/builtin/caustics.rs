@@ -144,4 +144,16 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_lamp_of_any_size_has_the_same_flux() {
+        for lamp in [0.01, 0.05, 0.4] {
+            let scene = load_with("caustics", &[("lamp", ParamValue::Number(lamp))]);
+            let light = &crate::LightList::of(&scene).lights[0];
+            assert!((light.area / (lamp * lamp) - 1.0).abs() < 1e-6, "{light:?}");
+            let radiance = f64::from(scene.materials[1].emission.x);
+            let flux = light.area * std::f64::consts::PI * radiance;
+            assert!((flux / 20.0 - 1.0).abs() < 1e-6, "{lamp}: {flux}");
+        }
+    }
 }

@@ -312,4 +312,18 @@ mod tests {
         let scene = load_default("many-lights");
         assert_eq!(LightList::of(&scene).lights.len(), 128);
     }
+
+    #[test]
+    fn the_floor_below_a_luminaire_reaches_twice_its_height() {
+        for height in [0.5, 2.5, 40.0] {
+            let scene = load_with("luminaire", &[("height", ParamValue::Number(height))]);
+            let bounds = scene.bounds();
+            let reach = [bounds.max.x, bounds.max.z, -bounds.min.x, -bounds.min.z];
+            assert_eq!(reach, [2.0 * height as f32; 4]);
+            let Some(crate::Light::Ies { position, .. }) = scene.lights.first() else {
+                panic!("{:?}", scene.lights)
+            };
+            assert_eq!(position.to_array(), [0.0, height as f32, 0.0]);
+        }
+    }
 }

@@ -249,4 +249,29 @@ mod tests {
         assert_eq!(list.problems.len(), 2);
         assert!(list.problems[0].contains("light 1") && list.problems[1].contains("not finite"));
     }
+
+    #[test]
+    fn a_second_environment_map_is_left_out_and_told() {
+        let map = |name: &str| {
+            let map = crate::EnvironmentMap::new(name, [2, 1], vec![Vec3::ONE; 2], &mut Vec::new());
+            Light::Environment {
+                map: std::sync::Arc::new(map.expect("a map")),
+                scale: 1.0,
+                turn: 0.0,
+            }
+        };
+        let mut scene = load_default("cornell-box");
+        let before = LightList::of(&scene);
+        scene.lights.extend([map("first"), map("second")]);
+        let list = LightList::of(&scene);
+        assert_eq!(list.lights.len(), before.lights.len() + 1);
+        let Some(last) = list.lights.last() else {
+            panic!("no light")
+        };
+        assert_eq!(last.source, Source::Light(0));
+        assert_eq!(
+            list.problems[..],
+            ["light 1 (environment) is left out: there is one already"]
+        );
+    }
 }
