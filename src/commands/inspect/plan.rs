@@ -78,7 +78,11 @@ fn describe(
     if empty > 0 {
         writeln!(
             text,
-            "\n{empty} shards have nothing to do: what is timed in the same rounds stays together."
+            "\n{} nothing to do: what is timed in the same rounds stays together.",
+            match empty {
+                1 => "1 shard has".to_owned(),
+                more => format!("{more} shards have"),
+            }
         )?;
     }
     Ok(())
