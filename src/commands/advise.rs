@@ -322,3 +322,44 @@ fn regrets_table(trials: &[Trial]) -> Table {
     table.rows.push(row("all".to_owned(), &|_| true));
     table
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raystone::advice::Choice;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn what_is_cheaper_for_fewer_or_more_rays_is_named_with_their_number() {
+        let of = |name: &str, build_ms: f64, ns: f64| {
+            let prediction = Prediction {
+                choice: Choice::of_label(name).expect("a label"),
+                build_ms,
+                ns: BTreeMap::from([("bounce".to_owned(), ns)]),
+            };
+            // A million rays.
+            (prediction, build_ms + ns)
+        };
+        // 100 + 100 ms; as fast is `bvh` at 300,000 rays, `roped-bvh` at half a million, and `bvh8` from two million on.
+        let advised = [
+            of("cwbvh", 100.0, 100.0),
+            of("roped-bvh", 50.0, 200.0),
+            of("bvh", 10.0, 400.0),
+            of("bvh8", 280.0, 10.0),
+            of("bvh4", 500.0, 20.0),
+        ];
+        let demand = Demand {
+            rays: 1e6,
+            classes: Vec::new(),
+        };
+        let text = why(&advised, &demand);
+        for part in [
+            "cwbvh: 50.0 % of its cost are rays, 50.0 % the build.",
+            "roped-bvh would cost 25.0 % more.",
+            "Below 500,000 rays roped-bvh is cheaper.",
+            "From 2,000,000 rays on bvh8 is cheaper.",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+    }
+}

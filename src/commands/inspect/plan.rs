@@ -78,11 +78,10 @@ fn describe(
     if empty > 0 {
         writeln!(
             text,
-            "\n{} no work: what is timed in the same rounds stays together.",
-            if empty == 1 {
-                "1 shard has".to_owned()
-            } else {
-                format!("{empty} shards have")
+            "\n{} nothing to do: what is timed in the same rounds stays together.",
+            match empty {
+                1 => "1 shard has".to_owned(),
+                more => format!("{more} shards have"),
             }
         )?;
     }

@@ -7,6 +7,7 @@ use raystone::config::{Animation, Axis, Follow, Motion};
 use raystone::image::Image;
 use raystone::integrator::{Renderer, Stage};
 use raystone::measure::animation::moved;
+use raystone::params::ParamValue;
 use raystone::run::{Estimator, Registries};
 use raystone_viewer::{Screen, Step, Viewer, Work};
 
@@ -172,4 +173,39 @@ fn an_object_is_grasped_moved_and_put_back() {
         viewer.screen().unwrap().cells[0][Axis::Scene].name,
         "cornell-box"
     );
+}
+
+#[test]
+fn what_is_grasped_is_the_object_whose_triangle_is_seen() {
+    // Objects of eight triangles: the first and the last of each are hit, too.
+    let scene = "axes.scene=[\"instances\"]";
+    let mut viewer = viewer();
+    let now = screen(&[
+        scene,
+        "scene.instances.detail=8",
+        "scene.instances.count=27",
+    ]);
+    show(&mut viewer, now);
+    let changes = [
+        ("detail", ParamValue::Integer(8)),
+        ("count", ParamValue::Integer(27)),
+    ];
+    let scene = support::builtin("instances", &changes);
+    let assembly = scene.assembly.as_ref().expect("instances");
+    let firsts: Vec<u32> = assembly.instances().iter().map(|i| i.first).collect();
+    let mut ends = [0; 2];
+    for pixel in (0..32).flat_map(|y| (0..40).map(move |x| [x, y])) {
+        let Some(grasp) = viewer.grasp(pixel).unwrap() else {
+            continue;
+        };
+        let seen = viewer.inspect(pixel).unwrap().expect("a pixel");
+        let hit = seen.sides[0].hit.expect("a hit").triangle;
+        let first = firsts[grasp.instance as usize];
+        let next = firsts.get(grasp.instance as usize + 1);
+        let end = next.copied().unwrap_or(scene.triangles.len() as u32);
+        assert!((first..end).contains(&hit), "{pixel:?}: {hit} of {grasp:?}");
+        ends[0] += u32::from(hit == first);
+        ends[1] += u32::from(hit + 1 == end);
+    }
+    assert!(ends.iter().all(|seen| *seen > 3), "{ends:?}");
 }

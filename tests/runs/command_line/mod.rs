@@ -467,3 +467,41 @@ fn verify_ends_with_0_where_hits_are_right_and_with_1_where_a_kernel_skips_a_tri
         assert!(!stdout(&right).contains(expected), "{expected}");
     }
 }
+
+#[test]
+fn the_command_of_each_shard_plans_the_cells_that_were_divided() {
+    let chosen = [
+        "inspect",
+        "tests/data/tiny.toml",
+        "--set",
+        "axes.decorrelation=none,cranley-patterson",
+        "--only",
+        "accel=bvh",
+        "--only",
+        "decorrelation=none",
+    ];
+    let inspected = |more: &[&str]| stdout(&run(&[&chosen[..], more].concat()));
+    let told = inspected(&["--shards", "5"]);
+    let words = told.split_once("raystone run ").and_then(|(_, rest)| {
+        let (words, rest) = rest.split_once(" --shard K/5 --resume --out ")?;
+        rest.starts_with("DIR/K\n").then_some(words)
+    });
+    let words: Vec<&str> = words.expect("a command").split_whitespace().collect();
+    let again = run(&[&["inspect"], &words[..], &["--cells", "--shards", "5"]].concat());
+    let cells = inspected(&["--cells", "--shards", "5"]);
+    assert_eq!(stdout(&again), cells);
+    assert_eq!(cells.lines().count(), 4, "{cells}");
+    // Cells that are timed together leave others nothing.
+    for (shards, said) in [
+        ("4", "\n1 shard has nothing"),
+        ("7", "\n3 shards have nothing"),
+    ] {
+        let told = stdout(&run(&[
+            "inspect",
+            "tests/data/tiny.toml",
+            "--shards",
+            shards,
+        ]));
+        assert!(told.contains(said), "{told}");
+    }
+}
