@@ -2,6 +2,7 @@
 //! and lights of every kind that they know.
 
 use crate::mesh::Mesh;
+use crate::trial_lights::luminaire_lights;
 use crate::trial_reach::alphas;
 use crate::trial_scenes::{TrialScene, camera, depth, word};
 use glam::{Quat, Vec2, Vec3, vec3};
@@ -87,11 +88,18 @@ fn leaning() -> Texture {
     }
 }
 
+/// Materials of no triangle.
+const SPARE: u32 = 30;
+
 /// A floor and a wall between mirrors.
 pub(crate) fn mirrors() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(0.9, 1.7, 3.2), vec3(0.0, 0.5, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("mirrors", camera, vec3(0.05, 0.04, 0.03))?;
     let mirror = |name| Material::mirror(name, vec3(0.9, 0.8, 0.7));
+    // Which materials connect is a bit of each: those of the mirrors are beyond the first word.
+    for spare in 0..SPARE {
+        mesh.material(Material::diffuse(format!("spare {spare}"), Vec3::ONE));
+    }
     let [floor, wall, plane, ball, dish, holed, wavy, lamp, shard] = [
         Material::diffuse("floor", vec3(0.7, 0.6, 0.5)),
         Material::phong("wall", vec3(0.3, 0.4, 0.6), vec3(0.3, 0.3, 0.2), 12.0),
@@ -160,5 +168,6 @@ pub(crate) fn mirrors() -> Result<SceneData, SceneError> {
             decay: true,
         },
     ];
+    scene.lights.push(luminaire_lights()[0].clone());
     Ok(scene)
 }

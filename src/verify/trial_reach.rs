@@ -4,6 +4,7 @@
 
 use crate::kinds::KindChecks;
 use crate::mesh::Mesh;
+use crate::trial_mirrors::connected;
 use crate::trial_scenes::{TrialScene, camera, clamp, depth, lamps, word};
 use glam::{Vec3, vec2, vec3};
 use raystone_core::params::ParamValue;
@@ -34,7 +35,11 @@ pub(super) fn scenes(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> 
         },
         TrialScene {
             scene: within_a_lamp()?,
-            trials: vec![path(&[depth(3)]), path(&[depth(3), clamp()])],
+            trials: vec![
+                path(&[depth(3)]),
+                path(&[depth(3), clamp()]),
+                path(&[depth(3), connected()]),
+            ],
         },
     ];
     for (name, factor) in [("large-room", LARGE), ("small-room", SMALL)] {
@@ -213,11 +218,12 @@ fn every_pair(kinds: &KindChecks) -> Result<SceneData, SceneError> {
     Ok(scene)
 }
 
-/// A block and a ball in a corner, all of it within a ball that shines inwards, and beside a small one.
+/// A block, a ball and a mirror in a corner, all of it within a ball that shines inwards, and beside a small one.
 fn within_a_lamp() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(1.2, 1.5, 2.4), vec3(-0.1, 0.5, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("within-a-lamp", camera, Vec3::ZERO)?;
-    let [floor, block, shiny] = [
+    let [mirror, floor, block, shiny] = [
+        Material::mirror("mirror", vec3(0.9, 0.8, 0.7)),
         Material::diffuse("floor", vec3(0.7, 0.5, 0.6)),
         Material::diffuse("block", vec3(0.4, 0.7, 0.5)),
         Material::phong("shiny", vec3(0.2, 0.3, 0.4), Vec3::splat(0.5), 30.0),
@@ -225,6 +231,10 @@ fn within_a_lamp() -> Result<SceneData, SceneError> {
     .map(|m| mesh.material(m));
     mesh.plain([vec3(-1.5, 0.0, -1.5), 3.0 * Vec3::Z, 3.0 * Vec3::X], floor);
     mesh.plain([vec3(-1.5, 0.0, -1.0), 3.0 * Vec3::X, 1.5 * Vec3::Y], floor);
+    mesh.plain(
+        [vec3(-1.4, 0.05, -0.2), vec3(-0.1, 0.8, 0.0), 0.9 * Vec3::Z],
+        mirror,
+    );
     mesh.block(vec3(-0.7, 0.0, -0.5), vec3(0.5, 0.9, 0.4), block);
     mesh.ball(vec3(0.5, 0.4, 0.3), 0.38, shiny);
     let mut scene = mesh.done(Vec::new());

@@ -4,3 +4,4 @@ mod faults;
 mod methods;
 mod runs;
 mod scan;
+mod votes;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 const GROUPS: u32 = 5;
 
-fn with_test_kernels(library: KernelLibrary) -> Gpu {
+pub(super) fn with_test_kernels(library: KernelLibrary) -> Gpu {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/device/compaction/kernels");
     open(library.with_folder(&folder).expect("kernels"))
 }

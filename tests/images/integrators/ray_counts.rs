@@ -50,6 +50,21 @@ fn a_closed_box_has_the_rays_that_its_bounces_ask_for() {
 }
 
 #[test]
+fn counts_go_beyond_a_word() {
+    // As if each ray were so many, which makes more than 2³² of an image.
+    const EACH: u64 = (1 << 20) + 1;
+    let change = ("ray_counts[kind]++", "ray_counts[kind] += 0x100001u");
+    let gpu = open(kernels_with("common/ray_counts", &[change]));
+    let stage = Stage::builtin(&gpu, "furnace-box", &[("albedo", ParamValue::Number(0.8))]);
+    let traced = stage.traced(&gpu, structure("bvh"));
+    let sampler = sampler("pixel-hash", "none");
+    let renderer = stage.renderer(&gpu, &traced, &sampler, &path(3), SIZE, true);
+    renderer.render(&[SPP], 4).expect("a render");
+    let [primary, _, _, bounce, _] = renderer.ray_counts().expect("counts");
+    assert_eq!([primary, bounce], [SAMPLES * EACH, 3 * SAMPLES * EACH]);
+}
+
+#[test]
 fn an_open_scene_has_fewer_rays_after_the_first_hit() {
     let sphere = [("triangles", ParamValue::Integer(2000))];
     let bvh = [structure("bvh")];
