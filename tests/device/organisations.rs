@@ -58,13 +58,24 @@ fn rendered(
     what: &Variant,
     by: &Variant,
 ) -> Result<(Bits, Vec<u64>), GpuError> {
+    rendered_as(SIZE, gpu, stage, traced, [what, by])
+}
+
+/// [`rendered`] of a size.
+fn rendered_as(
+    size: [u32; 2],
+    gpu: &Gpu,
+    stage: &Stage,
+    traced: &Traced,
+    [what, by]: [&Variant; 2],
+) -> Result<(Bits, Vec<u64>), GpuError> {
     let integrator = IntegratorRegistry::default()
         .configured(what)
         .expect("an integrator");
     let by = OrganisationRegistry::default().configured(by);
     let integrator = integrator.organised(by.expect("an organisation"));
     let job = RenderJob {
-        size: SIZE,
+        size,
         camera: stage.camera,
         sampler: &sampler("owen-sobol", "none"),
         integrator: &integrator.map_err(GpuError::Kernel)?,
@@ -157,6 +168,45 @@ fn a_queue_of_any_length_makes_the_same_image_and_one_too_long_is_refused_with_n
                 }
             }
         }
+    }
+}
+
+/// Whether an image is the same in bands, which sums need where a buffer does not hold them all.
+fn is_same_in_bands(kernels: KernelLibrary, by: &Variant) -> Result<bool, GpuError> {
+    const SIZE: [u32; 2] = [200, 97];
+    let image = |gpu: &Gpu| {
+        let stage = Stage::builtin(gpu, "cornell-box", &[]);
+        let traced = stage.traced(gpu, structure("bvh"));
+        rendered_as(SIZE, gpu, &stage, &traced, [&path(3), by])
+    };
+    let mut few = alone(kernels);
+    // 61 rows of 200 pixels, and the paths of eight.
+    few.limits.max_storage_buffer_binding_size = 192 << 10;
+    Ok(image(&few)? == image(gpu())?)
+}
+
+#[test]
+fn an_image_in_bands_is_that_of_one_buffer() {
+    for by in [
+        organisation("regeneration", &[]),
+        organisation("multi-kernel", &[]),
+        small(&[]),
+    ] {
+        let found = is_same_in_bands(KernelLibrary::default(), &by);
+        assert!(found.expect("an image"), "{by:?}");
+    }
+}
+
+#[test]
+fn faults_in_the_rows_of_bands_are_seen() {
+    const FROM: &str = " - frame.band_row)";
+    for (by, module) in [
+        (organisation("regeneration", &[]), "regeneration"),
+        (organisation("multi-kernel", &[]), "accumulate"),
+    ] {
+        let changed = kernels_with(&format!("organisation/{module}"), &[(FROM, ")")]);
+        let found = is_same_in_bands(changed, &by);
+        assert!(!found.unwrap_or(false), "{by:?}");
     }
 }
 
