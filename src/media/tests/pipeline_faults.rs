@@ -122,7 +122,7 @@ const FAULTS: [(&str, &str, &str, &str); 22] = [
 ];
 
 /// The same of adaptive photons, with the filter that shows it.
-const ADAPTIVE_FAULTS: [(&str, &str, &str, &str); 14] = [
+const ADAPTIVE_FAULTS: [(&str, &str, &str, &str); 15] = [
     // Pilots in the wrong cells, counted for every voxel, from the wrong column, and without squares.
     (
         "photons",
@@ -183,6 +183,12 @@ const ADAPTIVE_FAULTS: [(&str, &str, &str, &str); 14] = [
         "counted(level, voxel).x < least",
         "counted(level, voxel).x <= least",
         "count",
+    ),
+    (
+        "adaptive/smooth",
+        "counted(level_with(1.0, voxel), voxel).y",
+        "counted(0u, voxel).y",
+        "weight",
     ),
     (
         "adaptive/smooth",
@@ -445,6 +451,8 @@ fn a_run_of_photons_without_a_fault_passes() {
         "content = \"shadow\"\nmode = \"adaptive\"\nwarp = [\"alias\", \"hierarchical\"]",
         "photons = 48\ncontent = [\"ball\", \"cube\", \"lens\", \"torus\"]",
         "photons = 32\nmode = \"adaptive\"\ncontent = \"ball\"\nfilter = \"both\"",
+        // So few that voxels have none.
+        "photons = 16\nmode = \"adaptive\"\npilot_cells = 5\nfilter = [\"weight\", \"both\"]",
         "photons = 48\nmode = [\"reference\", \"adaptive\"]\nfilter = [\"blur\", \"constant\", \"count\", \"surround\", \"weight\", \"both\"]",
     ];
     for load in in_turn("loads of photons", all) {

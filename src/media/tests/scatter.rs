@@ -126,6 +126,23 @@ fn attempts_that_are_used_up_drop_what_is_missing() {
 }
 
 #[test]
+fn what_is_dropped_is_counted_beyond_a_word() {
+    let Some(gpu) = adapter() else { return };
+    let deposit = Deposit {
+        place: 3,
+        energy: Vec3::ONE,
+        direction: Vec3::X,
+    };
+    // Each is 3 · 2¹⁶ units of what is dropped: a word holds 21,845 of them.
+    let adding = Adding {
+        bits: 24,
+        ..Adding::new(Strategy::Sort, 1)
+    };
+    let (_, tallies, _) = scatter_list(&gpu, adding, CELLS, &vec![deposit; 50_001]).unwrap();
+    assert_eq!((tallies.drops, tallies.dropped), (50_000, 150_000.0));
+}
+
+#[test]
 fn numbers_that_go_round_are_counted_to_the_last() {
     let Some(gpu) = adapter() else { return };
     let deposit = Deposit {
