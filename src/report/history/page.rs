@@ -62,7 +62,7 @@ impl History<'_> {
                 && other.work != series.work
         };
         match self.series.iter().find(is_like) {
-            Some(_) => format!("{} ({})", series.key, series.work),
+            Some(_) => format!("{} ({})", series.key, short_work(&series.work)),
             None => series.key.to_string(),
         }
     }
@@ -182,7 +182,8 @@ fn plot(series: &[&Series]) -> CurvePlot {
             .filter(|(axis, _)| shared.get(axis).is_none());
         let mut own: Vec<&str> = own.map(|(_, label)| label).collect();
         own.extend(several.then_some(series.device.as_str()));
-        own.extend(works.then_some(series.work.as_str()));
+        let work = works.then(|| short_work(&series.work));
+        own.extend(work.as_deref());
         let label = if own.is_empty() {
             series.key.to_string()
         } else {
@@ -245,5 +246,29 @@ fn short(commit: &str) -> &str {
     match commit.char_indices().nth(12) {
         Some((end, _)) if !commit.ends_with('+') => &commit[..end],
         _ => commit,
+    }
+}
+
+/// Returns the work of a series with the first characters of the scene's hash.
+fn short_work(work: &str) -> String {
+    match work
+        .strip_prefix("scene ")
+        .and_then(|of| of.split_once(';'))
+    {
+        Some((hash, amount)) => format!("scene {};{amount}", short(hash)),
+        None => work.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_is_shown_with_the_first_characters_of_a_hash() {
+        let hash = "991a7b2f7a6839d8d8bc0047fbb366e7d835598dc0e502bf9d567ba06024f83d";
+        let shown = short_work(&format!("scene {hash}; 4096 rays"));
+        assert_eq!(shown, "scene 991a7b2f7a68; 4096 rays");
+        assert_eq!(short_work("4096 rays"), "4096 rays");
     }
 }
