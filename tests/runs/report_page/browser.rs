@@ -107,10 +107,21 @@ impl Browser {
         let file = folder.path().join("outer.html");
         std::fs::write(&file, outer).expect("a page");
         let scheme = if dark { "0" } else { "1" };
-        let (dom, log) = self.run(
-            &file,
-            &[&format!("--blink-settings=preferredColorScheme={scheme}")],
-        );
+        let scheme = format!("--blink-settings=preferredColorScheme={scheme}");
+        // The browser's time does not wait for its frames: on a busy machine none may show the images before it is over.
+        let visit = || Seen::of(&self.run(&file, &[&scheme]));
+        let mut seen = visit();
+        for _ in 0..2 {
+            if seen.is("asleep") {
+                seen = visit();
+            }
+        }
+        seen
+    }
+}
+
+impl Seen {
+    fn of((dom, log): &(String, String)) -> Self {
         let result = dom
             .rsplit("<pre id=\"result\">")
             .next()
@@ -125,14 +136,12 @@ impl Browser {
             .lines()
             .filter(|line| line.contains(":CONSOLE"))
             .map(str::to_owned);
-        Seen {
+        Self {
             found: serde_json::from_str(&result).unwrap_or(Value::Null),
             console: console.collect(),
         }
     }
-}
 
-impl Seen {
     /// A finding; none if it was not looked for.
     pub fn value(&self, name: &str) -> Option<&Value> {
         self.found.get(name)

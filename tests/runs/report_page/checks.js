@@ -58,6 +58,7 @@
         await Promise.race([new Promise(requestAnimationFrame), wait(50)]);
       }
       const canvas = box.querySelector("canvas");
+      found.asleep = !canvas;
       const press = (mode) => box.querySelector(`button[data-mode=${mode}]`).click();
       const pixel = (x, y, of = canvas) => [...of.getContext("2d").getImageData(x, y, 1, 1).data].slice(0, 3);
       const point = (type, x, y, buttons = 0) => {
