@@ -212,19 +212,21 @@ fn of_rays(record: &StructureRecord, faults: &mut Vec<String>) {
             ));
         }
         faults.extend(rate_fault(&timing.mrays_s, timing.rays as f64, &timing.ms));
-        counted_twice(&timing.ms, &timing.wall_ms, faults);
+        counted_twice(&timing.ms, [&timing.wall_ms, &timing.cpu_ms], faults);
         of_processors(&timing.cpu_ms, [&timing.ms, &timing.wall_ms], faults);
     }
     of_hits(&record.timings, faults);
 }
 
-/// Two rounds that are equal to the bit by each of two clocks are one. Where one clock is all there is, it may be coarse.
-fn counted_twice(ms: &[f64], wall_ms: &[f64], faults: &mut Vec<String>) {
+/// Two rounds that are equal to the bit by each of three clocks are one. By two clocks, rounds of a quarter of a millisecond are
+/// equal by chance once in a few thousand runs. Where the adapter has no clock, the host's may be coarse, and nothing is said.
+fn counted_twice(ms: &[f64], [wall_ms, cpu_ms]: [&[f64]; 2], faults: &mut Vec<String>) {
     let mut known = BTreeSet::new();
-    let rounds = ms.iter().zip(wall_ms).filter(|(ms, wall)| ms != wall);
-    let mut rounds = rounds.map(|(ms, wall)| (ms.to_bits(), wall.to_bits()));
-    if let Some((ms, _)) = rounds.find(|round| !known.insert(*round)) {
-        let ms = f64::from_bits(ms);
+    let rounds = ms.iter().zip(wall_ms).zip(cpu_ms);
+    let mut rounds = rounds.filter(|((ms, wall), _)| ms != wall);
+    let twice =
+        rounds.find(|((ms, wall), cpu)| !known.insert([ms, wall, cpu].map(|t| t.to_bits())));
+    if let Some(((ms, _), _)) = twice {
         faults.push(format!("a round of {ms} ms is counted twice"));
     }
 }
@@ -259,7 +261,7 @@ fn of_image(record: &TimeRecord, faults: &mut Vec<String>) {
     if let Some(rate) = record.mrays_s {
         faults.extend(rate_fault(&rate, record.traced_rays() as f64, &record.ms));
     }
-    counted_twice(&record.ms, &record.wall_ms, faults);
+    counted_twice(&record.ms, [&record.wall_ms, &record.cpu_ms], faults);
     of_processors(&record.cpu_ms, [&record.ms, &record.wall_ms], faults);
     of_paths(record, faults);
     let stages: f64 = record.stages.values().sum();
@@ -341,6 +343,19 @@ mod tests {
     use std::collections::BTreeMap;
 
     #[test]
+    fn rounds_are_one_where_every_clock_says_so() {
+        let said = |wall: [f64; 2], cpu: &[f64]| {
+            let mut faults = Vec::new();
+            counted_twice(&[3.0, 3.0], [&wall, cpu], &mut faults);
+            !faults.is_empty()
+        };
+        assert!(said([3.5, 3.5], &[3.6, 3.6]));
+        // Chance, one clock for two, and a system without a clock of the process.
+        assert!(!said([3.5, 3.5], &[3.6, 3.7]) && !said([3.5, 3.6], &[3.6, 3.6]));
+        assert!(!said([3.0, 3.0], &[3.6, 3.6]) && !said([3.5, 3.5], &[]));
+    }
+
+    #[test]
     fn figures_that_contradict_each_other_are_faults() {
         let (structure, cell) = crate::known_readings::known();
         let said = |body: Body| contradiction(&body).unwrap_or_default();
@@ -351,6 +366,7 @@ mod tests {
             ("counted twice", |r| {
                 let of = &mut r.timings[0];
                 (of.ms, of.wall_ms) = (vec![2.0, 3.0, 3.0, 4.0], vec![2.5, 3.5, 3.5, 4.5]);
+                of.cpu_ms = vec![2.6, 3.6, 3.6, 4.6];
             }),
             ("sum of build", |r| r.build_ms = 0.005),
             ("rate", |r| r.timings[0].mrays_s = Interval::exact(4.0)),
