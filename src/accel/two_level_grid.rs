@@ -52,7 +52,7 @@ impl Structure for TwoLevelGrid {
 }
 
 /// Parts along each axis of a top cell that lists triangles of these areas.
-fn parts(grid: &Grid, areas: impl ExactSizeIterator<Item = f32>, lambda: f64) -> [u32; 3] {
+fn parts(grid: &Grid, areas: impl ExactSizeIterator<Item = f32> + Clone, lambda: f64) -> [u32; 3] {
     let side = grid.cell.map(f64::from);
     let Cut { wanted, share } = Cut::new(side, areas, lambda);
     std::array::from_fn(|a| {
@@ -78,7 +78,7 @@ fn cut(
     most: u64,
 ) -> Result<Built, AccelError> {
     let tops = grid.cells() as usize;
-    let areas = areas(soup);
+    let areas = areas(&grid, soup);
     let resolutions = |cell: usize| {
         let ids = top.of(cell).iter();
         parts(&grid, ids.map(|&id| areas[id as usize]), lambda)

@@ -53,6 +53,12 @@ pub enum ConfigError {
         /// The reason.
         source: std::io::Error,
     },
+    /// The file is a model by its name.
+    #[error("{path} is a model, not an experiment file; type: --scene {path}", path = path.display())]
+    Model {
+        /// The file.
+        path: PathBuf,
+    },
     /// The text is not TOML (for instance, a key is written twice).
     #[error("{at}: not valid TOML: {message}")]
     Syntax {

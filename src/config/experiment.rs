@@ -7,6 +7,7 @@ use super::sections::{
     Animation, Coherence, Discrepancy, Gate, Reference, Run, StopRule, Timing, Window,
 };
 use super::settings::Settings;
+use super::variants::has_model_ending;
 use super::{Catalogue, ConfigError, parse};
 use raystone_core::geometry::Camera;
 use raystone_core::params::{Params, Variant};
@@ -137,6 +138,10 @@ impl Experiment {
         overrides: &[String],
         catalogue: &Catalogue,
     ) -> Result<Self, ConfigError> {
+        if has_model_ending(path) {
+            let path = path.to_owned();
+            return Err(ConfigError::Model { path });
+        }
         let bytes = std::fs::read(path).map_err(|source| ConfigError::Read {
             path: path.to_owned(),
             source,

@@ -78,9 +78,12 @@ fn shared_parameters(entries: &[Entry]) -> ParameterSchema {
 }
 
 fn is_path(text: &str) -> bool {
-    let extension = Path::new(text).extension().and_then(|e| e.to_str());
-    text.contains(['/', '\\'])
-        || extension.is_some_and(|e| MODEL_ENDINGS.contains(&e.to_lowercase().as_str()))
+    text.contains(['/', '\\']) || has_model_ending(Path::new(text))
+}
+
+pub(super) fn has_model_ending(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str());
+    extension.is_some_and(|e| MODEL_ENDINGS.contains(&e.to_lowercase().as_str()))
 }
 
 const EMBEDDED: &str = "embedded";

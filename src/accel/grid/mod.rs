@@ -120,10 +120,10 @@ pub(crate) struct Cut {
 }
 
 impl Cut {
-    /// A cell with these sides that lists triangles of these areas.
+    /// A cell with these sides that lists triangles of these areas, see [`areas`].
     pub(crate) fn new(
         side: [f64; 3],
-        areas: impl ExactSizeIterator<Item = f32>,
+        areas: impl ExactSizeIterator<Item = f32> + Clone,
         lambda: f64,
     ) -> Self {
         // A flat cell is no reason for ever smaller parts.
@@ -131,6 +131,10 @@ impl Cut {
         let side = side.map(|s| s.max(longest / 16.0));
         let count = areas.len();
         let wanted = cleary(side, count, lambda);
+        // Parts that all list most triangles only lengthen the walk.
+        if 2 * areas.clone().filter(|area| area.is_infinite()).count() > count {
+            return Self { wanted, share: 0.0 };
+        }
         let volume = side.iter().product::<f64>();
         let section = (volume / side.iter().copied().fold(longest, f64::min)) as f32;
         let area = areas.map(|a| f64::from(a.min(section))).sum::<f64>();
@@ -144,8 +148,16 @@ impl Cut {
     }
 }
 
-pub(crate) fn areas(soup: &TriangleSoup) -> Vec<f32> {
+/// Areas of all triangles; infinite for a needle so thin that every part of a cell of `grid` lists it.
+pub(crate) fn areas(grid: &Grid, soup: &TriangleSoup) -> Vec<f32> {
     let area = |record: &TriangleRecord| {
+        let margins = raster::margin_of(record) as f32;
+        // Its box bounds what lists it, however much its cells are grown.
+        let (extent, margin) = (record.bounds().extent(), grid.margin);
+        let reach = |a: usize| (margin[a] * margins).min(2.0 * (extent[a] + 2.0 * margin[a]));
+        if (0..3).all(|a| reach(a) >= grid.cell[a]) {
+            return f32::INFINITY;
+        }
         let [e, f] = record.edges();
         0.5 * cross(e, f).iter().map(|n| n * n).sum::<f64>().sqrt() as f32
     };
@@ -292,5 +304,16 @@ mod tests {
         // The largest section of the cell is 2 · 4.
         assert_eq!(cut(1e6), cut(8.0));
         assert!(cut(8.0).share < cut(4.0).share);
+    }
+
+    #[test]
+    fn a_cell_of_needles_that_every_part_would_list_stays_whole() {
+        let cut = |needles: usize| {
+            let areas = [f32::INFINITY; 4].into_iter().take(needles);
+            let areas: Vec<f32> = areas.chain([1e-6; 4]).take(4).collect();
+            Cut::new([1.0; 3], areas.into_iter(), 64.0).share
+        };
+        assert_eq!([cut(0), cut(3), cut(4)], [1.0, 0.0, 0.0]);
+        assert!(cut(2) > 0.0);
     }
 }

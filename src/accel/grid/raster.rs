@@ -89,7 +89,7 @@ impl Raster {
 /// Margins by which cells inside a triangle's box are grown for it. The distance to the plane of a
 /// needle loses accuracy by its length over its width, so hits land beside it; they stay in its
 /// box.
-fn margin_of(record: &TriangleRecord) -> f64 {
+pub(super) fn margin_of(record: &TriangleRecord) -> f64 {
     let [e, f] = record.edges();
     let square = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
     let third = std::array::from_fn(|a| f[a] - e[a]);

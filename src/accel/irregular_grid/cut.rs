@@ -33,7 +33,7 @@ pub(super) fn cut(
     let most = most_words(log).min(MOST_PLACES);
     log.phase("build", || {
         let tops = coarse.cells() as usize;
-        let areas = areas(soup);
+        let areas = areas(&coarse, soup);
         let voxels = |cell: usize| {
             let ids = lists.of(cell).iter();
             let areas = ids.map(|&id| areas[id as usize]);
@@ -66,7 +66,7 @@ fn parts_log(
     fine: &Grid,
     settings: &Options,
     size: u32,
-    areas: impl ExactSizeIterator<Item = f32>,
+    areas: impl ExactSizeIterator<Item = f32> + Clone,
 ) -> u32 {
     if areas.len() == 0 {
         return 0;

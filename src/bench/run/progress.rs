@@ -22,7 +22,7 @@ const PRIOR: f64 = 0.1;
 #[derive(Debug)]
 struct Shared {
     start: Instant,
-    /// Expected seconds in total, and of finished steps.
+    /// Expected seconds in total, 0 where nothing says so, and of finished steps.
     expected_s: f64,
     done_s: f64,
     told: Instant,
@@ -51,9 +51,12 @@ impl Shared {
             return None;
         }
         self.told = Instant::now();
-        let share = 100.0 * self.share();
         let [so_far, left] = [self.start.elapsed().as_secs_f64(), self.left_s()].map(duration);
         let message = &self.message;
+        if self.expected_s == 0.0 {
+            return Some(format!("after {so_far}: {message}"));
+        }
+        let share = 100.0 * self.share();
         Some(format!(
             "{share:.0} % after {so_far}, about {left} left: {message}"
         ))
@@ -83,16 +86,7 @@ impl Progress {
         } else {
             ProgressBar::hidden()
         };
-        let template = "{bar:32} {percent}% · {elapsed} · about {left} left · {wide_msg}";
-        let style = ProgressStyle::with_template(template);
-        let of = Arc::clone(&shared);
-        let left = move |_: &ProgressState, out: &mut dyn Write| {
-            let _ = out.write_str(&duration(lock(&of).left_s()));
-        };
-        bar.set_style(match style {
-            Ok(style) => style.with_key("left", left),
-            Err(_) => ProgressStyle::default_bar(),
-        });
+        set_style(&bar, "{elapsed} · {wide_msg}", &shared);
         if options.progress {
             bar.enable_steady_tick(Duration::from_millis(500));
         }
@@ -105,6 +99,8 @@ impl Progress {
 
     /// Sets the expected total time in seconds.
     pub(super) fn expect(&self, seconds: f64) {
+        let template = "{bar:32} {percent}% · {elapsed} · about {left} left · {wide_msg}";
+        set_style(&self.bar, template, &self.shared);
         let mut shared = lock(&self.shared);
         shared.expected_s = seconds;
         shared.start = Instant::now();
@@ -127,6 +123,19 @@ impl Progress {
         }
         self.bar.set_message(message);
     }
+}
+
+/// Styles a bar, with the remaining time as `left`.
+fn set_style(bar: &ProgressBar, template: &str, shared: &Arc<Mutex<Shared>>) {
+    let of = Arc::clone(shared);
+    let left = move |_: &ProgressState, out: &mut dyn Write| {
+        let _ = out.write_str(&duration(lock(&of).left_s()));
+    };
+    let style = ProgressStyle::with_template(template);
+    bar.set_style(style.map_or_else(
+        |_| ProgressStyle::default_bar(),
+        |style| style.with_key("left", left),
+    ));
 }
 
 fn tell_if_due(shared: &Mutex<Shared>, tell: fn(&str)) {
@@ -239,6 +248,18 @@ mod tests {
         make_due();
         thread::sleep(2 * BETWEEN_LOOKS);
         assert_eq!(told(), lines);
+    }
+
+    #[test]
+    fn without_an_expected_time_a_line_promises_none() {
+        let due = |expected_s: f64| {
+            let mut shared = shared(expected_s, 0.0, 30);
+            shared.message = "checking".to_owned();
+            shared.told -= BETWEEN_LINES;
+            shared.line().unwrap()
+        };
+        assert_eq!(due(0.0), "after 30 s: checking");
+        assert!(due(60.0).starts_with("0 % after 30 s, about "));
     }
 
     #[test]
