@@ -11,7 +11,7 @@
 //! Each of these is a crate of its own below this one, which has the command line and names them all.
 //!
 //! Every figure is gated for truth before it is printed: a structure whose hits differ from the
-//! judge's gets no speed.
+//! reference tracer's gets no speed.
 #![warn(missing_docs)]
 
 #[path = "confirm.rs"]
@@ -46,7 +46,7 @@ pub mod compare {
     pub use raystone_report::compare::*;
 }
 
-/// What is measured and how it is judged: checks, figures, statistics, records.
+/// What is measured, and what it is held against: checks, figures, statistics, records.
 pub mod measure {
     pub use raystone_bench::{
         animation, compaction, environment, figure_registry, known_pictures, known_words, memory,
@@ -65,7 +65,7 @@ pub mod measure {
 pub mod repro {
     pub use raystone_report::repro::*;
 
-    /// Tables, run and judged.
+    /// Tables, run and compared with what they claim.
     pub mod run {
         pub use crate::reproduce::{ReproError, reproduce};
         pub use raystone_report::repro::table::*;

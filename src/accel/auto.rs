@@ -262,4 +262,19 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn coordinates_that_clustering_refuses_get_the_plain_builder_on_either_side_of_0() {
+        let settings = TreeParameters {
+            builder: Builder::Auto,
+            ..TreeParameters::default()
+        };
+        for far in [2.0 * LARGEST_OF_PLOC, -2.0 * LARGEST_OF_PLOC] {
+            let mut soup = lattice(2);
+            soup.records[3].v0[1] = far;
+            let mut log = BuildLog::default();
+            let resolved = with_builder(&settings, &soup, &mut log).unwrap();
+            assert_eq!(resolved.builder, TreeParameters::default().builder, "{far}");
+        }
+    }
 }

@@ -52,7 +52,7 @@ pub struct Verify {
     /// Rays of each class [default: gate.rays of the experiment]
     #[arg(long, value_name = "N")]
     rays: Option<u32>,
-    /// Render known images instead: scenes with answers in closed form, or by quadrature, each judged to 0.2 % or better
+    /// Render known images instead: scenes with answers in closed form, or by quadrature, each held to 0.2 % or better
     #[arg(long, conflicts_with_all = ["file", "scene", "accel", "rays", "set", "only", "json"])]
     images: bool,
     #[command(flatten)]

@@ -257,4 +257,25 @@ mod tests {
         assert_eq!(spread(3, 8), [0, 1, 2]);
         assert_eq!(spread(10, 4), [0, 2, 5, 7]);
     }
+
+    #[test]
+    fn what_the_model_does_not_know_of_makes_no_further_cells() {
+        let text = "[axes]\nscene = [\"cornell-box\"]\naccel = [\"bvh\", \"cwbvh\"]\nsequence = [\"sobol\"]\n[coherence]\n";
+        let registries = crate::run::Registries::default();
+        let modelled = |overrides: &[&str]| {
+            let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
+            let experiment =
+                Experiment::parse(text, "test", &overrides, &registries.catalogue()).unwrap();
+            let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d)).unwrap();
+            [plan.modelled(&experiment).len(), plan.times.len()]
+        };
+        assert_eq!(modelled(&[]), [2, 2]);
+        for further in [
+            "axes.load=buffer,texture",
+            "axes.organisation=single-kernel,wavefront",
+            "axes.workgroup=8x8,16x4",
+        ] {
+            assert_eq!(modelled(&[further]), [2, 4], "{further}");
+        }
+    }
 }

@@ -35,9 +35,9 @@ const HEIGHTS: [f64; 2] = [0.04, 0.8];
 parameters! {
     /// What bends light.
     enum Target {
-        /// a ball of glass in a grid, its border blurred: judged by Snell's law
+        /// a ball of glass in a grid, its border blurred: checked by Snell's law
         Ball = "ball",
-        /// a lens of Luneburg in closed form: judged by its focus
+        /// a lens of Luneburg in closed form: checked by its focus
         Lens = "lens",
     }
 

@@ -28,7 +28,7 @@ const BASELINE: &str = "compaction:roger";
 /// A curve has so many points at least.
 const LEAST_POINTS: usize = 3;
 
-const JUDGED: &str = "Each method first compacted its stream once and was judged word by word against what the flags \
+const CHECKED: &str = "Each method first compacted its stream once and was checked word by word against what the flags \
                       say: elements that stay, no hole, none twice, in their order where that is promised. Then all \
                       were timed in the same rounds; before each turn the count was set to a wrong number and what \
                       stayed wiped out, and after it two sums over what stayed were compared with the host's. What \
@@ -40,7 +40,7 @@ pub(crate) fn section(data: &RunData) -> Option<Section> {
         return None;
     }
     let mut section = Section::new("compaction", "Compaction of streams");
-    section.blocks.push(Block::Paragraph(JUDGED.into()));
+    section.blocks.push(Block::Paragraph(CHECKED.into()));
     section.blocks.extend(Block::figures(plots(data)));
     let values = values(data);
     let tables = [growth_table(data, &values), table(data, &values)];
@@ -274,7 +274,7 @@ pub(crate) fn table(data: &RunData, values: &[Value]) -> Table {
         ];
         (cell.key.clone(), cells)
     };
-    let heads = ["method", "elements", "valid", "bytes", ":judge"];
+    let heads = ["method", "elements", "valid", "bytes", ":correctness check"];
     Rows::new(&ROW, &heads, data.measured_by(NAME).iter().map(row)).table(
         values,
         format!(

@@ -137,6 +137,22 @@ fn rounding_of_a_constant_is_no_bias_and_one_percent_in_a_tile_is() {
 }
 
 #[test]
+fn what_rounding_explains_is_never_detectable() {
+    let mut generator = Pcg32::new(81);
+    let [images, exact] = [8, 8].map(|count| noisy(count, 0.1, &mut generator));
+    let detectable = |rounding: f64| {
+        let options = BiasOptions {
+            rounding,
+            ..BiasOptions::default()
+        };
+        let check = check_bias(&images, &exact, options).unwrap();
+        check.detectable.expect("noise on both sides")
+    };
+    let (without, with) = (detectable(0.0), detectable(0.01));
+    assert!((with - without - 0.01).abs() < 1e-9, "{without} {with}");
+}
+
+#[test]
 fn a_planted_bias_of_a_few_percent_in_one_tile_is_found_there() {
     let mut generator = Pcg32::new(5);
     let parts = noisy(8, 0.1, &mut generator);
