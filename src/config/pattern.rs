@@ -87,6 +87,12 @@ impl Selector {
                     _ => patterns.push(Pattern::new(pattern)),
                 }
             }
+            if axis.is_none() {
+                return Err(ConfigError::Only {
+                    text: format!("'{text}'"),
+                    problem: "it is empty; without it all cells are kept".to_owned(),
+                });
+            }
         }
         Ok(selector)
     }

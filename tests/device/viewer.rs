@@ -217,7 +217,12 @@ fn the_noise_of_the_reference_is_no_error_of_the_image() {
     let error = |spp: u32| {
         let mut viewer = viewer();
         let spp = format!("run.spp=[{spp}]");
-        let mut now = screen(&[&spp, "axes.sequence=[\"pixel-hash\"]", "reference.spp=2"]);
+        let mut now = screen(&[
+            &spp,
+            "axes.sequence=[\"pixel-hash\"]",
+            "axes.decorrelation=[\"none\"]",
+            "reference.spp=2",
+        ]);
         now.window.error = true;
         show(&mut viewer, now);
         finish(&mut viewer);

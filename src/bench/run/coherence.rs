@@ -273,7 +273,7 @@ mod tests {
         for further in [
             "axes.load=buffer,texture",
             "axes.organisation=single-kernel,wavefront",
-            "axes.workgroup=8x8,16x4",
+            "axes.workgroup=8x8,16x16",
         ] {
             assert_eq!(modelled(&[further]), [2, 4], "{further}");
         }

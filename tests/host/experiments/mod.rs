@@ -535,6 +535,7 @@ fn filters_and_excludes_that_fit_nothing_are_mistakes() {
             ["--only accel=bhv", "no accel fits `bhv`", "`bvh`"],
         ),
         ("bvh", ["--only bvh", "no `=`", "axis=pattern"]),
+        ("", ["--only ''", "it is empty", "axis=pattern"]),
     ] {
         assert_says(plan(&experiment, &[only]), &pieces);
     }
