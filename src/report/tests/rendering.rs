@@ -116,3 +116,43 @@ fn a_table_of_last_errors_says_with_how_many_samples_each_sampler_ended() {
         assert_eq!(column, ["32", "32", "32", "8", "8"], "{caption}");
     }
 }
+
+/// Returns the tables among blocks, folded ones too.
+fn tables_in(blocks: &[document::Block]) -> Vec<&document::Table> {
+    let mut tables = Vec::new();
+    for block in blocks {
+        match block {
+            document::Block::Table(table) => tables.push(table),
+            document::Block::Fold(fold) => tables.extend(tables_in(&fold.blocks)),
+            _ => {}
+        }
+    }
+    tables
+}
+
+#[test]
+fn a_table_of_discrepancies_without_room_for_all_counts_keeps_the_largest() {
+    for counts in [8, 9, 12, 17] {
+        let lines = changed(|_, body| {
+            if let Body::Stream(record) = body {
+                let first = record.star[0];
+                let at = |k: usize| FigureAtCount { n: 4 << k, ..first };
+                record.star = (0..counts).map(at).collect();
+            }
+        });
+        let data = RunData::new(&lines);
+        let section = sections::streams::section(&data).unwrap();
+        let tables = tables_in(&section.blocks);
+        let star = tables
+            .iter()
+            .find(|t| t.caption.starts_with("D*, star discrepancy of"));
+        let star = star.unwrap_or_else(|| panic!("{counts} counts"));
+        let titles: Vec<&str> = star.columns.iter().map(|c| c.title.as_str()).collect();
+        let last = titles.last().unwrap().replace(',', "");
+        assert!(
+            last.ends_with(&(4 << (counts - 1)).to_string()),
+            "{titles:?}"
+        );
+        assert!((4..=8 + 2).contains(&titles.len()), "{titles:?}");
+    }
+}
