@@ -141,4 +141,24 @@ mod tests {
                 .is_empty()
         );
     }
+
+    #[test]
+    fn a_scene_beyond_those_of_the_fit_costs_what_the_farthest_of_them_does() {
+        // Weights of one for the spread of sizes, of which the fit saw 1 to 4, and for triangles, of which it saw up to 2²⁰.
+        let table = "adapter = 'known'\nscenes = []\nleast = [1, 3, 1, 0, 0, 0, 0]\nmost = [1, 20, 4, 4, 4, 4, 9]\n\
+            [[choice]]\nstructure = 'one'\nbuild_ms = [0, 1, 0, 0, 0, 0, 0]\nns.bounce = [0, 0, 1, 0, 0, 0, 0]\n";
+        let table = AdviceTable::parse(table).unwrap();
+        for (size_spread, ns) in [(0.0, 2.0), (1.0, 2.0), (3.0, 8.0), (4.0, 16.0), (9.0, 16.0)] {
+            let features = SceneFeatures {
+                triangles: 1 << 24,
+                copies: 1,
+                size_spread,
+                ..SceneFeatures::default()
+            };
+            let found = &table.predict(&features)[0];
+            assert_eq!(found.ns["bounce"], ns, "{size_spread}");
+            // Of triangles alone there may be any number.
+            assert_eq!(found.build_ms, f64::from(1 << 24));
+        }
+    }
 }

@@ -228,4 +228,27 @@ mod tests {
             assert!(error.contains(says), "{text}: {error}");
         }
     }
+
+    #[test]
+    fn the_speed_is_that_of_the_samples_without_loading_and_building() {
+        let rendering = Rendering {
+            triangles: 12,
+            spp: 4,
+            first_picture_s: 5.0,
+            samples_s: 1.5,
+            total_s: 6.0,
+            rays: 3_000_000,
+            report: Default::default(),
+            non_finite_pixels: 0,
+            uniform: None,
+            in_order: None,
+        };
+        let text = summary(&rendering, [64, 48]);
+        for part in [
+            "4 spp: 6.0 s, first picture after 5.0 s",
+            "3,000,000 rays, 2.00 Mrays/s",
+        ] {
+            assert!(text.contains(part), "{text}");
+        }
+    }
 }

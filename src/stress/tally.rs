@@ -356,4 +356,37 @@ mod tests {
         let not_asked = |r: &raystone_record::Reading| r.figure != figure::ANY_DIFFERING.id;
         assert!(found.readings.iter().all(not_asked));
     }
+
+    #[test]
+    fn a_rung_tells_the_99th_percentile_of_distance_and_point() {
+        let mut tally = Tally::default();
+        for k in 0..=100 {
+            let k = f64::from(k);
+            let outcome = Outcome {
+                verdict: ExactVerdict::Hit(1.0),
+                errors: Some([k, 0.0, 1000.0 + 2.0 * k, 0.0]),
+            };
+            tally.add(&outcome, false, String::new);
+        }
+        let case = Case {
+            family: "plane",
+            label: "plane, ordinary".to_owned(),
+            place: crate::placement::Placement::ORDINARY,
+            scene: crate::case::scene(Vec::new(), None),
+            rays: Vec::new(),
+            truth: Truth::Exact,
+        };
+        let mut found = Found::default();
+        tally.tell_rung(&mut found, &case);
+        let told: Vec<(&str, f64)> = (found.readings.iter())
+            .map(|r| (r.figure.as_str(), r.value.value))
+            .collect();
+        let expected = [
+            (&*figure::RAYS.id, 101.0),
+            (&*figure::FALSE_MISSES.id, 0.0),
+            (&*figure::T_ULP_P99.id, 99.0),
+            (&*figure::POINT_ULP_P99.id, 1198.0),
+        ];
+        assert_eq!(told, expected);
+    }
 }

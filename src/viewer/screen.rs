@@ -253,4 +253,27 @@ mod tests {
         );
         assert_eq!(screen.dragged.len(), 1);
     }
+
+    #[test]
+    fn all_that_changes_samples_begins_them_anew_and_the_rest_of_the_window_does_not() {
+        let screen = Screen::parse(START, "x", &[], &Registries::default()).unwrap();
+        let changed = |change: fn(&mut Screen)| {
+            let mut other = screen.clone();
+            change(&mut other);
+            (screen.restarts(&other), other.restarts(&screen))
+        };
+        let changes: [fn(&mut Screen); 6] = [
+            |s| s.cells.push(s.cells[0].clone()),
+            |s| s.camera = Some(Camera::upright(Vec3::ONE, Vec3::ZERO, 50.0)),
+            |s| s.size[1] += 1,
+            |s| s.spp += 1,
+            |s| s.seed += 1,
+            |s| s.dragged.extend([(0, Vec3::X)]),
+        ];
+        for (number, change) in changes.into_iter().enumerate() {
+            assert_eq!(changed(change), (true, true), "change {number}");
+        }
+        assert_eq!(changed(|s| s.reference.seed += 1), (false, false));
+        assert_eq!(changed(|_| ()), (false, false));
+    }
 }

@@ -208,6 +208,10 @@ fn more_runs_than_timestamps_are_played_in_parts_and_all_of_them() {
         let played = player.play(&recording).expect("it plays");
         assert_eq!(played.runs.len(), 2100);
         assert!(played.elapsed().gpu_ms.is_none_or(|ms| ms > 0.0));
+        // Each waits for the one before: all together take no longer than the host waited for all parts.
+        let own: f64 = played.runs.iter().filter_map(|(_, ms)| *ms).sum();
+        let waited = played.elapsed().wall_ms;
+        assert!(own <= 1.5 * waited + 0.5, "{own} ms in {waited} ms");
         assert_eq!(
             played.download::<u32>("before").expect("words"),
             [0; WORDS as usize]

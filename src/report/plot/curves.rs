@@ -301,4 +301,19 @@ mod tests {
         assert!(two.draw().is_some());
         assert!(plot(vec![]).draw().is_none());
     }
+
+    #[test]
+    fn an_interval_that_reaches_far_down_leaves_the_curve_its_room() {
+        let at = |x, y, low| CurvePoint { x, y, low, high: y };
+        let between = |low| {
+            let mut plot = plot(vec![at(1.0, 1.0, 1.0), at(2.0, 0.1, low)]);
+            plot.guides.clear();
+            let spots = plot.draw().unwrap().spots;
+            spots[1].at.1 - spots[0].at.1
+        };
+        // A decade of the three that a thirtieth of the lower point leaves on the axis.
+        for low in [0.1, 1e-5, 1e-12] {
+            assert!(between(low) > 0.25 * PLOT_HEIGHT, "{low}: {}", between(low));
+        }
+    }
 }

@@ -337,4 +337,24 @@ mod tests {
         assert_eq!(tinted(net), 0);
         assert_eq!(tinted(vec![[0.1, 0.1], [0.2, 0.2]]), 3);
     }
+
+    #[test]
+    fn the_concentric_map_takes_equal_steps_along_a_side_to_equal_angles() {
+        // Shirley and Chiu 1997: half a side of the square is an eighth of the circle, on the side where it lies.
+        for (point, degrees) in [
+            ([1.0, 0.75], 22.5),
+            ([0.75, 1.0], 67.5),
+            ([0.25, 1.0], 112.5),
+            ([0.0, 0.75], 157.5),
+            ([0.0, 0.25], 202.5),
+            ([0.25, 0.0], 247.5),
+            ([0.75, 0.0], 292.5),
+            ([1.0, 0.25], 337.5),
+        ] {
+            let (sin, cos) = f64::to_radians(degrees).sin_cos();
+            let [x, y] = Domain::ConcentricDisc.place(point);
+            let off = (2.0 * x - 1.0 - cos).hypot(2.0 * y - 1.0 - sin);
+            assert!(off < 1e-12, "{point:?}: {x} {y}");
+        }
+    }
 }

@@ -132,10 +132,34 @@ pub fn error_table(names: &Names, view: &View, values: &[Value], metric: Metric)
 }
 
 /// Returns other metrics at the highest spp.
-fn further_table(names: &Names, view: &View, values: &[Value]) -> Table {
-    let spp = view.samplers.iter().find_map(MeasuredSampler::highest_spp);
-    let spp = spp.map_or(String::new(), |spp| spp.to_string());
-    FURTHER_ERRORS.table(names, values, &[&view.name, &spp])
+pub(crate) fn further_table(names: &Names, view: &View, values: &[Value]) -> Table {
+    at_ends(FURTHER_ERRORS, names, view, values, |sampler| {
+        sampler.highest_spp()
+    })
+}
+
+/// Returns a table of figures at the samples that each sampler ended with: told once if they are the same, and of each
+/// where `run.stop` ended them apart.
+pub(super) fn at_ends(
+    spec: TableSpec,
+    names: &Names,
+    view: &View,
+    values: &[Value],
+    end: impl Fn(&MeasuredSampler) -> Option<u32>,
+) -> Table {
+    let ends = view.samplers.iter().filter_map(|s| Some((&s.key, end(s)?)));
+    let ends: Vec<(&Key, u32)> = ends.collect();
+    let Some((_, first)) = ends.first() else {
+        return Table::default();
+    };
+    if ends.iter().all(|(_, spp)| spp == first) {
+        return spec.table(names, values, &[&view.name, &format!("{first} spp")]);
+    }
+    let rows = ends
+        .iter()
+        .map(|(key, spp)| ((*key).clone(), vec![spp.to_string().into()]));
+    let words = [&*view.name, "the spp that each ended with"];
+    spec.beside(names, values, &words, &["spp"], rows)
 }
 
 /// Returns the table of bias verdicts.

@@ -135,7 +135,7 @@ pub(crate) const ERRORS: TableSpec = TableSpec {
     },
 };
 pub(crate) const FURTHER_ERRORS: TableSpec = TableSpec {
-    caption: "Other metrics with {} at {} spp: mean [95 % interval] over replicates, the noise of the reference included; PSNR, \
+    caption: "Other metrics with {} at {}: mean [95 % interval] over replicates, the noise of the reference included; PSNR, \
               SSIM and FLIP of tone-mapped pictures; `raystone list metrics` has the formulas",
     rows: &[Sampler], figures: &[&MAE, &RELMSE_TRIMMED, &MSE_LUMINANCE, &SMAPE, &PSNR, &SSIM, &FLIP], across: BY_FIGURE,
 };
@@ -154,7 +154,7 @@ pub(crate) const EFFICIENCY: TableSpec = TableSpec {
     figures: &[&MS_PER_SPP, &ERROR_SECONDS, &ERROR_AT_TIME, &SPP_TO_ERROR, &SECONDS_TO_ERROR],
 };
 pub(crate) const SPECTRA: TableSpec = TableSpec {
-    caption: "Error in space with {} at {} spp, luminance: power up to 1/8 cycle per pixel (white noise 1), power of the loudest \
+    caption: "Error in space with {} at {}, luminance: power up to 1/8 cycle per pixel (white noise 1), power of the loudest \
               wave (n pixels of white noise: about ln n), correlation of neighbours (white noise 0), RMSE, and share of it after \
               Gaussian filters of standard deviation σ",
     rows: &[Sampler], across: BY_SUBJECT,

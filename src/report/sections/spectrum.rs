@@ -1,5 +1,6 @@
 //! Spectra of the errors of samplers, and errors left by filters.
 
+use super::samplers::at_ends;
 use super::specs::SPECTRA;
 use crate::data::{RunData, View};
 use crate::document::*;
@@ -90,11 +91,7 @@ fn curves(
     spectra.map(curve).collect()
 }
 
-fn table(data: &RunData, view: &View, values: &[Value]) -> Table {
-    let spp = view
-        .samplers
-        .iter()
-        .find_map(|s| Some(s.spectrum?.spp))
-        .unwrap_or(0);
-    SPECTRA.table(&data.names, values, &[&view.name, &spp.to_string()])
+pub(crate) fn table(data: &RunData, view: &View, values: &[Value]) -> Table {
+    let end = |sampler: &MeasuredSampler| Some(sampler.spectrum?.spp);
+    at_ends(SPECTRA, &data.names, view, values, end)
 }

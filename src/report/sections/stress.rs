@@ -270,4 +270,26 @@ mod tests {
         assert_eq!(at("far (223423)"), [None, Some(223_423.0)]);
         assert_eq!(at("elsewhere"), [None, None]);
     }
+
+    #[test]
+    fn of_several_cases_in_one_place_the_worst_is_drawn() {
+        let value = |case: &str, place: &str, ulp: f64| {
+            let key = Key::default().with(axis::SUBJECT, case);
+            let key = key.with(axis::PLACE, place);
+            Value::known(&key, [(&figure::T_ULP_P99, Some(Interval::exact(ulp)))])
+        };
+        let values = [
+            value("sphere, a", "ordinary", 1.0),
+            value("sphere, a", "scale 1e2", 2.0),
+            value("sphere, b", "scale 1e2", 7.0),
+            value("sphere, c", "scale 1e2", 3.0),
+            value("box, a", "scale 1e2", 9.0),
+        ]
+        .concat();
+        let values: Vec<&Value> = values.iter().collect();
+        let drawn = curve(&values, SWEEPS[0], (0, &"watertight".to_owned())).unwrap();
+        let points: Vec<[f64; 2]> = drawn.points.iter().map(|p| [p.x, p.y]).collect();
+        assert_eq!(points, [[1.0, 1.0], [100.0, 7.0]]);
+        assert_eq!(drawn.label, "watertight, sphere");
+    }
 }

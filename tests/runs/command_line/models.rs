@@ -245,6 +245,11 @@ fn a_scene_that_cannot_be_loaded_ends_with_2_and_the_rest_goes_on() {
     let records = std::fs::read_to_string(out.join("records.jsonl")).expect("records");
     assert!(records.contains(r#""kind":"structure""#) && records.contains(r#""passed":true"#));
     assert!(out.join("index.html").is_file());
+    // A lenient run forgives what fails, and no input that cannot be read.
+    let again = folder.path().join("lenient");
+    let tiny = ["run", "tests/data/tiny.toml", "--lenient", "--out"];
+    let again = run(&[&tiny[..], &[text(&again), "--set", &scenes]].concat());
+    assert_eq!(again.status.code(), Some(2), "{again:?}");
 }
 
 #[test]

@@ -136,6 +136,22 @@ fn a_check_that_fails_is_the_exit_code_unless_the_run_is_lenient_which_its_page_
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("failed: Reference noise"), "{said}");
     assert!(page("lenient").contains("no winner: ") && page("lenient").contains("--lenient"));
+    // Joined it is as lenient about the check, and not about a part that is missing.
+    let joined = |from: &str, out: &str| {
+        let [from, out] = [from, out].map(|name| folder.path().join(name));
+        let ended = output(&mut program(&["merge", text(&from), "--out", text(&out)]));
+        ended.status.code()
+    };
+    let part = [&noisy[..], &["--lenient", "--shard", "1/2"]].concat();
+    let (code, said, _) = run(folder.path(), "part", &part);
+    assert_eq!(code, 0, "{said}");
+    for (from, code) in [("strict", 1), ("lenient", 0), ("part", 1)] {
+        assert_eq!(
+            joined(from, &format!("{from}-joined")),
+            Some(code),
+            "{from}"
+        );
+    }
 }
 
 #[test]
