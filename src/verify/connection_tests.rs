@@ -65,7 +65,12 @@ fn floor(name: &str, half: f32) -> (Mesh, u32) {
 /// Greatest relative difference of the floor from its radiance in closed form under a point light and what reflects it.
 fn off(gpu: &Gpu, scene: &SceneData, radiance: impl Fn(DVec3) -> f64) -> f64 {
     const SIZE: [u32; 2] = [16, 16];
-    let integrator = path(&[depth(2), word("primary", "centre"), connected()]);
+    let integrator = path(&[
+        depth(2),
+        word("primary", "centre"),
+        word("lights", "all"),
+        connected(),
+    ]);
     let found = image(gpu, scene, SIZE, &integrator, 1).unwrap();
     let eye = scene.view(1.0).eye.as_dvec3();
     let directions = rays(scene, SIZE);
@@ -118,6 +123,54 @@ fn plane(gpu: &Gpu) -> f64 {
 fn a_plane_mirror_lights_like_the_image_of_the_light() {
     let worst = plane(&gpu());
     println!("plane mirrors: {worst:.2e}");
+    assert!(worst < 2e-5, "{worst}");
+}
+
+/// Dark spheres before a plane mirror: one in the way from the floor to it, one in that from it to the light.
+const BALLS: [(DVec3, f64); 2] = [
+    (DVec3::new(-0.9, 0.17, 0.03), 0.08),
+    (DVec3::new(-0.6, 0.45, 0.18), 0.05),
+];
+
+#[test]
+fn what_shines_itself_is_in_the_way_to_a_mirror_and_from_it() {
+    let (mut mesh, mirror) = floor("balls", 6.0);
+    mesh.plain(
+        [vec3(-1.5, 0.0, -3.0), 3.0 * Vec3::Y, 6.0 * Vec3::Z],
+        mirror,
+    );
+    let mut scene = with_point_light(mesh.done(Vec::new()));
+    let ball = |(centre, radius): (DVec3, f64)| Light::Sphere {
+        center: centre.as_vec3(),
+        radius: radius as f32,
+        radiance: Vec3::splat(1e-6),
+    };
+    scene.lights.extend(BALLS.map(ball));
+    let image_of_light = DVec3::new(-3.0 - LIGHT.x, LIGHT.y, LIGHT.z);
+    let is_between = |from: DVec3, to: DVec3, (centre, radius): (DVec3, f64)| {
+        let way = (to - from).normalize();
+        let beside = (centre - from - way * way.dot(centre - from)).length() - radius;
+        assert!(beside.abs() > 1e-5, "an edge of a shadow");
+        beside < 0.0
+    };
+    let counts = std::cell::Cell::new([0; 3]);
+    let worst = off(&gpu(), &scene, |point| {
+        let part = (-1.5 - point.x) / (image_of_light.x - point.x);
+        let at = point + (image_of_light - point) * part;
+        let before = is_between(point, at, BALLS[0]);
+        let behind = is_between(at, LIGHT, BALLS[1]);
+        let (place, over) = match (before, behind) {
+            (true, _) => (0, 0.0),
+            (_, true) => (1, 0.0),
+            _ => (2, 0.8),
+        };
+        let mut sums = counts.get();
+        sums[place] += 1;
+        counts.set(sums);
+        lit(point, LIGHT) + over * lit(point, image_of_light)
+    });
+    println!("{worst:.2e}, {:?} before, behind, neither", counts.get());
+    assert!(counts.get().iter().all(|count| *count > 5));
     assert!(worst < 2e-5, "{worst}");
 }
 

@@ -102,6 +102,8 @@ fn cases() -> Vec<(World, Keep)> {
         (world(Place::Thin, Some(Mirror::Plane), 0.05), count),
         (wide(Place::Checker, None), all),
         (wide(Place::Checker, Some(Mirror::Plane)), all),
+        // Reflected cones that would be wider than any may be.
+        (wide(Place::Checker, Some(Mirror::Sphere)), all),
     ]
 }
 

@@ -230,11 +230,18 @@ fn kernels_march_as_their_twin_does() {
         size: UVec3::splat(32),
         radius: 12.0,
     };
-    for (optical, regions) in [(&grid, None), (&grid, Some(&medium)), (&lens, None)] {
+    let cases = [
+        (&grid, None, 0.5),
+        (&grid, Some(&medium), 0.0),
+        // Of small regions several are one step.
+        (&grid, Some(&medium), 2.0),
+        (&lens, None, 0.5),
+    ];
+    for (optical, regions, step) in cases {
         let heights: Vec<f64> = (0..64).map(|k| -9.0 + 0.28 * f64::from(k)).collect();
         let begins = parallel_rays(optical, 32, 12.0, &heights);
         for scheme in Scheme::ALL {
-            let how = march(scheme, if regions.is_some() { 0.0 } else { 0.5 });
+            let how = march(scheme, step);
             let marcher = Marcher::new(&gpu, &how, optical, regions, &begins).unwrap();
             let (found, _) = marcher.march().unwrap();
             for (begin, found) in begins.iter().zip(&found) {

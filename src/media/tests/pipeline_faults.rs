@@ -453,11 +453,23 @@ fn a_run_of_photons_without_a_fault_passes() {
         "photons = 32\nmode = \"adaptive\"\ncontent = \"ball\"\nfilter = \"both\"",
         // So few that voxels have none.
         "photons = 16\nmode = \"adaptive\"\npilot_cells = 5\nfilter = [\"weight\", \"both\"]",
+        // Cells at the borders of odd levels hold fewer than so many.
+        "photons = 16\nstrategy = \"fixed-64\"\nfilter = \"count\"\nleast = 200",
         "photons = 48\nmode = [\"reference\", \"adaptive\"]\nfilter = [\"blur\", \"constant\", \"count\", \"surround\", \"weight\", \"both\"]",
     ];
     for load in in_turn("loads of photons", all) {
         let (failed, reason) = pipeline_run(folder.path(), "", load);
         assert_eq!(failed, 0, "{load} without a fault: {reason}");
+    }
+    // Of so small a grid some voxels take the widest level; through so fine a torus rays enter its glass twice.
+    let others = [
+        (5, "filter = \"surround\""),
+        (32, "content = \"torus\"\nreflectivity = 0.5"),
+    ];
+    for (side, load) in others {
+        let load = format!("photons = 48\nstrategy = \"fixed-64\"\n{load}");
+        let (failed, reason) = pipeline_run_of(folder.path(), "", side, &load);
+        assert_eq!(failed, 0, "{side} voxels a side, {load}: {reason}");
     }
 }
 

@@ -170,6 +170,20 @@ fn numbers_that_go_round_are_counted_to_the_last() {
 }
 
 #[test]
+fn sums_below_zero_are_read_back_where_their_lower_word_is_zero() {
+    let Some(gpu) = adapter() else { return };
+    // 2²⁴ units each: 256 of them are the upper word alone.
+    let deposit = Deposit {
+        place: 3,
+        energy: Vec3::ONE,
+        direction: Vec3::NEG_X,
+    };
+    let adding = Adding::new(Strategy::Fixed64, 0);
+    let (found, _, _) = scatter_list(&gpu, adding, CELLS, &vec![deposit; 256]).unwrap();
+    assert_eq!(found[3], [256.0, 256.0, 256.0, -256.0, 0.0, 0.0]);
+}
+
+#[test]
 fn what_cannot_be_added_is_refused_by_name() {
     let Some(gpu) = adapter() else { return };
     let some = deposits(8);

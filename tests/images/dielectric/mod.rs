@@ -18,6 +18,8 @@ struct Arrival {
     outside: bool,
     ior: f32,
     thin: bool,
+    /// By Schlick's polynomial.
+    schlick: bool,
 }
 
 impl Arrival {
@@ -47,7 +49,12 @@ fn arrivals() -> Vec<Arrival> {
     for ior in IORS.map(|n| n as f32) {
         for step in 0..=200_u16 {
             let cosine = f32::from(step) / 200.0;
-            for u in [0.0, 1.0 - f32::EPSILON] {
+            for (u, schlick) in [
+                (0.0, false),
+                (1.0 - f32::EPSILON, false),
+                (0.0, true),
+                (1.0 - f32::EPSILON, true),
+            ] {
                 for (outside, thin) in [(true, false), (false, false), (true, true), (false, true)]
                 {
                     out.push(Arrival {
@@ -56,6 +63,7 @@ fn arrivals() -> Vec<Arrival> {
                         outside,
                         ior,
                         thin,
+                        schlick,
                     });
                 }
             }
@@ -68,7 +76,8 @@ fn scatter(gpu: &Gpu, arrivals: &[Arrival]) -> Vec<Departure> {
     let mut parameters = Vec::new();
     let mut asked = Vec::new();
     for a in arrivals {
-        let row = [a.ior, f32::from(u8::from(a.thin)), 0.0, 0.0].map(f32::to_bits);
+        let [thin, schlick] = [a.thin, a.schlick].map(|is| f32::from(u8::from(is)));
+        let row = [a.ior, thin, schlick, 0.0].map(f32::to_bits);
         let place = parameters.iter().position(|known| *known == row);
         let place = place.unwrap_or_else(|| {
             parameters.push(row);
@@ -129,13 +138,23 @@ fn reflectance(cosine: f64, eta: f64) -> f64 {
     0.5 * (perpendicular.powi(2) + parallel.powi(2))
 }
 
+/// Schlick's polynomial in the cosine on the thinner side, where light is nearer to grazing; 1 where nothing is refracted.
+fn polynomial(cosine: f64, cos_refracted: f64, eta: f64) -> f64 {
+    let straight = ((eta - 1.0) / (eta + 1.0)).powi(2);
+    straight + (1.0 - straight) * (1.0 - cosine.min(cos_refracted)).powi(5)
+}
+
 fn faults(a: &Arrival, d: &Departure) -> Vec<&'static str> {
     let (cosine, eta) = (f64::from(a.cosine), a.eta());
     let sine = (1.0 - cosine * cosine).sqrt();
     let cos_refracted = (1.0 - (sine / eta).powi(2)).max(0.0).sqrt();
     // The root of a rounded difference: near the critical angle, and at grazing angles.
     let tolerance = 2e-6 + 1e-6 / cos_refracted.max(1e-3);
-    let once = reflectance(cosine, eta);
+    let once = if a.schlick {
+        polynomial(cosine, cos_refracted, eta)
+    } else {
+        reflectance(cosine, eta)
+    };
     let reflected = if a.thin {
         2.0 * once / (1.0 + once)
     } else {
@@ -252,6 +271,12 @@ fn planted_faults_are_seen() {
             "Fresnel's equations",
         ),
         (
+            fresnel,
+            "select(cos_refracted, cos_arriving, eta >= 1.0)",
+            "cos_arriving",
+            "Fresnel's equations",
+        ),
+        (
             file,
             "2.0 * reflectance / (1.0 + reflectance)",
             "reflectance",
@@ -310,6 +335,7 @@ fn the_critical_angle_and_brewsters_are_where_they_should_be() {
         outside,
         ior: n as f32,
         thin: false,
+        schlick: false,
     };
     let asked = [
         arrival(critical - 1e-5, false),
