@@ -251,9 +251,11 @@ mod tests {
             &["scene=a, b, accel=g"],
             &[("scene", &["a, b"]), ("accel", &["g"])],
         );
-        same(&[""], &[]);
+        same(&[], &[]);
         for (wrong, told) in [
             ("g(a=1)", "no `=`"),
+            ("", "it is empty"),
+            (" , ", "it is empty"),
             ("acel=bvh", "did you mean `accel`"),
             ("accel=a,scne=b", "unknown axis `scne`"),
         ] {
