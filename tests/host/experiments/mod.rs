@@ -381,6 +381,11 @@ fn a_file_that_cannot_be_read_is_named() {
         Experiment::load(path, &[], &catalogue()),
         &["no/such/experiment.toml", "cannot read"],
     );
+    let model = Path::new("no/such/MODEL.Ply");
+    assert_says(
+        Experiment::load(model, &[], &catalogue()),
+        &["MODEL.Ply is a model", "--scene no/such/MODEL.Ply"],
+    );
 }
 
 const SWEEP: &str = "[run]\nreplicates = 4\n[axes]\n\
