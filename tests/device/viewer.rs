@@ -212,29 +212,6 @@ fn maps_figures_and_errors_are_there_once_they_are_asked_for() {
 }
 
 #[test]
-fn the_noise_of_the_reference_is_no_error_of_the_image() {
-    // A reference of two samples per pixel, of which an unbiased error counts nothing: 64 samples err a 64th as much as one.
-    let error = |spp: u32| {
-        let mut viewer = viewer();
-        let spp = format!("run.spp=[{spp}]");
-        let mut now = screen(&[
-            &spp,
-            "axes.sequence=[\"pixel-hash\"]",
-            "axes.decorrelation=[\"none\"]",
-            "reference.spp=2",
-        ]);
-        now.window.error = true;
-        show(&mut viewer, now);
-        finish(&mut viewer);
-        let frame = viewer.frame();
-        assert_eq!(frame.reference_spp, Some(2));
-        frame.sides[0].figures.relmse.expect("an error")
-    };
-    let [one, many] = [1, 64].map(error);
-    assert!(many < 0.25 * one, "{many} of {one}");
-}
-
-#[test]
 fn a_pixel_tells_its_hit_its_path_and_its_points() {
     let mut viewer = viewer();
     show(&mut viewer, screen(&["axes.accel=[\"bvh\", \"cwbvh\"]"]));
